@@ -1,0 +1,64 @@
+"""Compiled kernels: one decorator, and a cache that knows when any kernel's source has changed.
+
+Numba's own cache looks only at the file of the function that is called, so an edited callee in another file
+would go unnoticed. Here the cache folder carries a hash of all of magfem's sources that hold kernels, lies in
+the user's cache folder (an installed package may be read-only) and is safe to share between processes.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+import os
+import tempfile
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numba
+
+log = logging.getLogger("magfem")
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+def kernel(function: Function) -> Function:
+    """Compile `function` to machine code on first use; the result is kept for later processes.
+
+    The kernel releases the interpreter lock, so that threads can share its work, and divides by zero as IEEE
+    arithmetic does (infinite fields on wires) instead of raising.
+    """
+    folder = _cache_folder()
+    previous, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(folder)
+    try:
+        compiled: Function = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
+    finally:
+        numba.config.CACHE_DIR = previous
+    if not any(folder.rglob(f"*.{function.__name__}-*.nbi")):
+        _announce()
+    return compiled
+
+
+@cache
+def _announce() -> None:
+    log.info("first use on this machine: compiling kernels, once, up to 40 s")
+
+
+@cache
+def _cache_folder() -> Path:
+    package = Path(__file__).parent
+    digest = hashlib.sha256(numba.__version__.encode())
+    for source in sorted(package.rglob("*.py")):
+        text = source.read_bytes()
+        if b"import kernel" in text:
+            digest.update(text)
+    base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    for parent in (Path(base), Path(tempfile.gettempdir())):
+        folder = parent / "magfem" / digest.hexdigest()[:16]
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError:
+            continue
+        if os.access(folder, os.W_OK):
+            return folder
+    return folder

@@ -1,0 +1,128 @@
+"""The circular current loop: B, gradient and hessian in one pass, compiled.
+
+The loop has radius a and lies in the plane z = 0 about the z axis. With s = x² + y², α = a² + s + z² and
+β² = 4a²s, everything is made of the positive integrals
+
+    T(j, p) = ∫₀^{2π} sin^{2j}ψ (α − β cos ψ)^{−p} dψ,
+
+so that nothing cancels near the axis. With c = µ₀I a²/4π (vector potential A_φ/ρ = c T(1, 3/2)):
+
+    B_z   = F(s, z) = c [T(1, 3/2)/2 + (3/2)(a² + z² − s) T(1, 5/2)]
+    B_ρ/ρ = G(s, z) = 3 z c T(1, 5/2).
+
+B is curl-free and divergence-free, so F_z = −2(G + sG_s) and G_z = 2F_s: its gradient needs F_s and G_s, its
+hessian F_ss and G_ss besides. Integrating d(sin^{2j+1}ψ D^{−p−1}) over a period, D = α − β cos ψ, gives
+
+    (p+1)(α² − β²) T(j, p+2) = (2p + 1 − 2j) α T(j, p+1) + (2j − p) T(j, p),
+
+which climbs in p without cancellation for every index used below. T(1, 3/2) and T(1, 5/2) are complete
+elliptic integrals (Simpson et al. 2001 give the field in them); T(2, 7/2) and T(3, 11/2) follow from
+differences where these are well conditioned, and all four from their hypergeometric series near the axis.
+"""
+
+from __future__ import annotations
+
+from math import pi, sqrt
+
+from magfem.compiled import kernel
+from magfem.constants import MU_0
+from magfem.typing import Floats
+
+_SERIES_BELOW = 0.12  # β²/α²; the series then needs at most 20 terms, the differences lose at most 3 digits
+
+
+@kernel
+def _series(p: float, j: int, leading: float, alpha: float, ratio: float) -> float:
+    """T(j, p) = leading·α^{−p} ₂F₁(p/2, (p+1)/2; j+1; β²/α²), for small β²/α²; leading = T(j, p) at β = 0, α = 1."""
+    a, b, c = p / 2, (p + 1) / 2, j + 1.0
+    term = leading * alpha**-p
+    total = term
+    for n in range(60):
+        term *= (a + n) * (b + n) / ((c + n) * (1.0 + n)) * ratio
+        total += term
+        if term < 1e-17 * total:
+            break
+    return total
+
+
+@kernel
+def add_loop(x: float, y: float, z: float, radius: float, current: float, order: int, out: Floats) -> None:
+    """Add the loop's jet at one point of its own frame to `out` (15,).
+
+    `out` holds B_x, B_y, B_z; then, from order 1, the gradient's xx, xy, xz, yy, yz; then, from order 2, the
+    hessian's xxx, xxy, xxz, xyy, xyz, yyy, yyz: both are symmetric and free of trace. SI units, `current` in
+    A (or turns, for T/A). The field on the wire itself is infinite or NaN.
+    """
+    s = x * x + y * y
+    rho = sqrt(s)
+    a2 = radius * radius
+    alpha = a2 + s + z * z
+    beta2 = 4.0 * a2 * s
+    far = (radius + rho) * (radius + rho) + z * z  # α + β
+    near = (radius - rho) * (radius - rho) + z * z  # α − β, without cancellation
+    product = far * near
+    ratio = beta2 / (alpha * alpha)
+    t2_72 = t3_112 = 0.0
+    if ratio < _SERIES_BELOW:
+        t1_32 = _series(1.5, 1, pi, alpha, ratio)
+        t1_52 = _series(2.5, 1, pi, alpha, ratio)
+        if order > 0:
+            t2_72 = _series(3.5, 2, 0.75 * pi, alpha, ratio)
+        if order > 1:
+            t3_112 = _series(5.5, 3, 0.625 * pi, alpha, ratio)
+    else:
+        # Complete elliptic integrals K and E of modulus √(2β/(α+β)) by the arithmetic–geometric mean.
+        g = sqrt(near / far)
+        m, weight, total = 1.0, 0.5, 0.5 * (1.0 - near / far)
+        for _ in range(12):
+            difference = 0.5 * (m - g)
+            m, g = 0.5 * (m + g), sqrt(m * g)
+            weight *= 2.0
+            total += weight * difference * difference
+            if difference < 1e-9 * m:
+                break
+        K = 0.5 * pi / m
+        E = K * (1.0 - total)
+        root = sqrt(far)
+        t1_32 = 8.0 / beta2 * (alpha * K / root - root * E)
+        t1_52 = 8.0 / (3.0 * beta2 * root) * (alpha * E / near - K)
+        t2_72 = 1.2 * (alpha * t1_52 - t1_32) / beta2
+    c = MU_0 / (4.0 * pi) * a2 * current
+    F = c * (0.5 * t1_32 + 1.5 * (a2 + z * z - s) * t1_52)
+    G = 3.0 * z * c * t1_52
+    out[0] += x * G
+    out[1] += y * G
+    out[2] += F
+    if order < 1:
+        return
+    t1_72 = (0.8 * alpha * t1_52 + 0.2 * t1_32) / product
+    t2_92 = 6.0 / 7.0 * (t1_52 - alpha * t2_72 / 6.0) / product
+    # G = 3zcQ with Q = T(1, 5/2): Q_α = −(5/2) T(1, 7/2), Q_β² = (35/24) T(2, 9/2).
+    q_alpha, q_beta2 = -2.5 * t1_72, 35.0 / 24.0 * t2_92
+    F_s = 1.5 * c * (t1_52 + 2.0 * z * z * q_alpha)  # G_z / 2
+    G_s = 3.0 * z * c * (q_alpha + 4.0 * a2 * q_beta2)
+    out[3] += G + 2.0 * x * x * G_s
+    out[4] += 2.0 * x * y * G_s
+    out[5] += 2.0 * x * F_s
+    out[6] += G + 2.0 * y * y * G_s
+    out[7] += 2.0 * y * F_s
+    if order < 2:
+        return
+    if ratio >= _SERIES_BELOW:
+        t3_112 = (alpha * t2_92 - t2_72) / (0.9 * beta2)
+    t1_92 = (4.0 * alpha * t1_72 - 0.5 * t1_52) / (3.5 * product)
+    t2_112 = (4.0 * alpha * t2_92 + 0.5 * t2_72) / (4.5 * product)
+    t3_132 = (t2_92 - 0.1 * alpha * t3_112) / product * (10.0 / 11.0)
+    q_alpha2 = 8.75 * t1_92
+    q_alpha_beta2 = 35.0 / 24.0 * -4.5 * t2_112
+    q_beta4 = 35.0 / 24.0 * 2.475 * t3_132
+    G_sz = 3.0 * c * (q_alpha + 4.0 * a2 * q_beta2 + 2.0 * z * z * (q_alpha2 + 4.0 * a2 * q_alpha_beta2))
+    G_ss = 3.0 * z * c * (q_alpha2 + 8.0 * a2 * q_alpha_beta2 + 16.0 * a2 * a2 * q_beta4)
+    G_z = 2.0 * F_s
+    out[8] += x * (6.0 * G_s + 4.0 * x * x * G_ss)
+    out[9] += y * (2.0 * G_s + 4.0 * x * x * G_ss)
+    out[10] += G_z + 2.0 * x * x * G_sz
+    out[11] += x * (2.0 * G_s + 4.0 * y * y * G_ss)
+    out[12] += 2.0 * x * y * G_sz
+    out[13] += y * (6.0 * G_s + 4.0 * y * y * G_ss)
+    out[14] += G_z + 2.0 * y * y * G_sz
