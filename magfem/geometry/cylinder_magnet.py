@@ -1,0 +1,23 @@
+"""Cylinder magnets: rods, pins and discs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from magfem.geometry.magnet_of_revolution import MagnetOfRevolution
+from magfem.geometry.tube import Tube
+
+
+@dataclass(frozen=True, kw_only=True)
+class CylinderMagnet(MagnetOfRevolution):
+    """A full cylinder: axis along z, centre at the origin. Raises InputError when it is impossible."""
+
+    kind = "cylinder_magnet"
+    dimensions = ("diameter", "length")
+
+    diameter: float  # m
+    length: float  # m, along z
+
+    @property
+    def tube(self) -> Tube:
+        return Tube(self.diameter, 0.0, self.length)

@@ -1,0 +1,80 @@
+"""What every device offers to the stages on its right, whatever its kind."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar, Protocol
+
+from magfem.fields.hull import Hull
+from magfem.fields.region import Shell
+from magfem.geometry.body import Body
+from magfem.geometry.card import CardOrigin
+from magfem.typing import Floats
+
+
+class Geometry(Protocol):
+    """A device in its source frame: z is the axis of revolution, the origin the body's centre."""
+
+    kind: ClassVar[str]  # as cards write it
+
+    @property
+    def name(self) -> str:
+        """For people."""
+        ...
+
+    @property
+    def source(self) -> str:
+        """Where the device's numbers come from; empty when not said."""
+        ...
+
+    @property
+    def origin(self) -> CardOrigin | None:
+        """The card it was read from; None when made in Python."""
+        ...
+
+    @property
+    def bodies(self) -> tuple[Body, ...]:
+        """The solids, each with its material, volume and area."""
+        ...
+
+    @property
+    def volume(self) -> float:
+        """Of all bodies, m³."""
+        ...
+
+    @property
+    def area(self) -> float:
+        """Surface of all bodies, m²."""
+        ...
+
+    @property
+    def moment(self) -> Floats:
+        """Magnetic moment if magnetised rigidly, (3,) A·m²."""
+        ...
+
+    @property
+    def hull(self) -> Hull:
+        """The convex hull, from which distances are counted."""
+        ...
+
+    @property
+    def feature_size(self) -> float:
+        """The smallest thickness that a mesh must resolve, m."""
+        ...
+
+    @property
+    def region(self) -> Shell:
+        """Where a model of this device must hold."""
+        ...
+
+    @property
+    def axisymmetric(self) -> bool:
+        """Whether the field is one of revolution about z, so that the half section suffices."""
+        ...
+
+    def build(self, occ: Any) -> dict[str, list[int]]:
+        """Make the solids in `occ`, which is `gmsh.model.occ` (m); volume tags by body name."""
+        ...
+
+    def build_meridian(self, occ: Any) -> dict[str, list[int]]:
+        """Make the half section, x = rho and y = z, in `occ`; surface tags by body name."""
+        ...

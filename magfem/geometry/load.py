@@ -1,0 +1,44 @@
+"""From the name or path of a device card to the device."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from difflib import get_close_matches
+
+from magfem.errors import InputError
+from magfem.geometry.card import Table, read_table
+from magfem.geometry.catalogue import resolve, short_path
+from magfem.geometry.cylinder_magnet import CylinderMagnet
+from magfem.geometry.geometry import Geometry
+from magfem.geometry.ring_magnet import RingMagnet
+from magfem.units import describe, quoted
+
+KINDS: dict[str, Callable[[Table], Geometry]] = {
+    CylinderMagnet.kind: CylinderMagnet.from_card,
+    RingMagnet.kind: RingMagnet.from_card,
+}
+"""Reader of the whole card by the card's `kind`."""
+
+
+def load_geometry(name_or_path: str | os.PathLike[str]) -> Geometry:
+    """The device of a catalogue name such as `ring_magnet_4x1.5x1`, or of a path to a device card.
+
+    Raises InputError for a name that the catalogue does not have, CardError for a card that is wrong.
+    """
+    if not isinstance(name_or_path, str | os.PathLike):
+        raise InputError(f"expected a device card's name or path, got {describe(name_or_path)}")
+    where = ("geometries", name_or_path, ".toml")
+    card = read_table(resolve(*where), short_path(*where))
+    return KINDS[_kind(card)](card)
+
+
+def _kind(card: Table) -> str:
+    if "kind" not in card and (misspelt := get_close_matches("kind", card.values, n=1)):
+        raise card.error(f'unknown key {quoted(misspelt[0])}; did you mean "kind"?', misspelt[0])
+    kind = card.text("kind")
+    if kind not in KINDS:
+        nearest = get_close_matches(kind, KINDS, n=1)
+        advice = f"did you mean {quoted(nearest[0])}?" if nearest else f"known: {', '.join(KINDS)}"
+        raise card.error(f"unknown kind {quoted(kind)}; {advice}", "kind")
+    return kind
