@@ -6,9 +6,7 @@ A *source* is a loop or a set of solid harmonics, with a centre, a frame and a r
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,7 +15,9 @@ from scipy.spatial.transform import RigidTransform
 from magfem.compiled import kernel
 from magfem.constants import MU_0
 from magfem.fields.loop import add_loop
+from magfem.fields.packing import unpack_gradient, unpack_hessian
 from magfem.fields.solid_harmonics import Complexes, add_harmonics, schmidt_scale
+from magfem.threads import in_chunks
 from magfem.typing import Floats, Integers, Jet, Points
 
 LOOP, HARMONIC = 0, 1
@@ -87,7 +87,6 @@ class Terms:
         work = [array if rank <= order else np.empty((0, *(3,) * (rank + 1)))
                 for rank, array in enumerate(results + [np.empty(0)] * (2 - order))]
         coefficients = _complex_coefficients(self)
-        workers = min(os.cpu_count() or 1, max(1, count // _PARALLEL_FROM))
 
         def run(chunk: slice) -> None:
             parts = [array[chunk] if rank <= order else array for rank, array in enumerate(work)]
@@ -96,13 +95,7 @@ class Terms:
                 self.degree, self.order, self.coefficient, coefficients, order, *parts,
             )
 
-        bounds = np.linspace(0, count, workers + 1).astype(int)
-        chunks = [slice(a, b) for a, b in zip(bounds, bounds[1:], strict=False)]
-        if workers == 1:
-            run(chunks[0])
-        else:
-            with ThreadPoolExecutor(workers) as pool:
-                list(pool.map(run, chunks))
+        in_chunks(run, count, _PARALLEL_FROM)
         return tuple(results)
 
 
@@ -234,9 +227,9 @@ def _evaluate(
                 local[:] = 0.0
         B[i, 0], B[i, 1], B[i, 2] = total[0], total[1], total[2]
         if order > 0:
-            _unpack_gradient(total, gradient[i])
+            unpack_gradient(total, gradient[i])
         if order > 1:
-            _unpack_hessian(total, hessian[i])
+            unpack_hessian(total, hessian[i])
 
 
 @kernel
@@ -246,33 +239,6 @@ def _same_frame(frame: Floats, k: int, other: int) -> bool:
             if frame[k, i, j] != frame[other, i, j]:
                 return False
     return True
-
-
-@kernel
-def _unpack_gradient(packed: Floats, gradient: Floats) -> None:
-    """The symmetric, trace-free (3, 3) from its five numbers."""
-    xx, xy, xz, yy, yz = packed[3], packed[4], packed[5], packed[6], packed[7]
-    gradient[0, 0], gradient[0, 1], gradient[0, 2] = xx, xy, xz
-    gradient[1, 0], gradient[1, 1], gradient[1, 2] = xy, yy, yz
-    gradient[2, 0], gradient[2, 1], gradient[2, 2] = xz, yz, -xx - yy
-
-
-@kernel
-def _unpack_hessian(packed: Floats, hessian: Floats) -> None:
-    """The symmetric, trace-free (3, 3, 3) from its seven numbers."""
-    xxx, xxy, xxz, xyy, xyz, yyy, yyz = (
-        packed[8], packed[9], packed[10], packed[11], packed[12], packed[13], packed[14],
-    )
-    xzz, yzz, zzz = -xxx - xyy, -xxy - yyy, -xxz - yyz
-    hessian[0, 0, 0], hessian[0, 0, 1], hessian[0, 0, 2] = xxx, xxy, xxz
-    hessian[0, 1, 0], hessian[0, 1, 1], hessian[0, 1, 2] = xxy, xyy, xyz
-    hessian[0, 2, 0], hessian[0, 2, 1], hessian[0, 2, 2] = xxz, xyz, xzz
-    hessian[1, 0, 0], hessian[1, 0, 1], hessian[1, 0, 2] = xxy, xyy, xyz
-    hessian[1, 1, 0], hessian[1, 1, 1], hessian[1, 1, 2] = xyy, yyy, yyz
-    hessian[1, 2, 0], hessian[1, 2, 1], hessian[1, 2, 2] = xyz, yyz, yzz
-    hessian[2, 0, 0], hessian[2, 0, 1], hessian[2, 0, 2] = xxz, xyz, xzz
-    hessian[2, 1, 0], hessian[2, 1, 1], hessian[2, 1, 2] = xyz, yyz, yzz
-    hessian[2, 2, 0], hessian[2, 2, 1], hessian[2, 2, 2] = xzz, yzz, zzz
 
 
 @kernel
@@ -287,14 +253,14 @@ def _add_rotated(
     for i in range(3):
         total[i] += f[i, 0] * local[0] + f[i, 1] * local[1] + f[i, 2] * local[2]
     if order > 0:
-        _unpack_gradient(local, work[0])
+        unpack_gradient(local, work[0])
         for i in range(2):
             for b in range(3):
                 half[0, i, b] = f[i, 0] * work[0, 0, b] + f[i, 1] * work[0, 1, b] + f[i, 2] * work[0, 2, b]
         for n, (i, j) in enumerate(((0, 0), (0, 1), (0, 2), (1, 1), (1, 2))):
             total[3 + n] += f[j, 0] * half[0, i, 0] + f[j, 1] * half[0, i, 1] + f[j, 2] * half[0, i, 2]
     if order > 1:
-        _unpack_hessian(local, work)
+        unpack_hessian(local, work)
         for n, (i, j, k) in enumerate(
             ((0, 0, 0), (0, 0, 1), (0, 0, 2), (0, 1, 1), (0, 1, 2), (1, 1, 1), (1, 1, 2))
         ):

@@ -1,0 +1,259 @@
+"""The field of a solved magnetisation, everywhere in space: Biot–Savart over the bodies' surfaces, compiled.
+
+A body's magnetisation is M = M₀ + χH with H = −∇φ. Its dipole integral over the volume equals the field of
+its bound currents ∇×M and M×n. With uniform M₀ and χ, and H the gradient of the *continuous* solved φ, there is
+no current inside, not even between elements, so the surface alone carries
+
+    K dS = M × n dS = [M₀ × (x_u × x_v) − χ (x_u φ_v − x_v φ_u)] du dv,
+
+which needs only the trace of φ. It is the same integral over the solved sources, exact in the open space and
+inside the magnet as well, with the accuracy of an integrated (not a differentiated) solution.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from magfem.compiled import kernel
+from magfem.constants import MU_0
+from magfem.fem.open_boundary import triangle_shapes
+from magfem.threads import in_chunks
+from magfem.typing import Floats, Jet, Points
+
+_FAR, _NEAR = 7.0, 2.6
+"""Distance over triangle size from which 6 and 16 points integrate it; below, the triangle is quartered."""
+_DEEPEST = 24  # quarterings: a point on the surface itself gets the mean of both sides
+
+
+@dataclass(frozen=True)
+class SurfaceCurrents:
+    """Bound currents on t curved triangles.
+
+    nodes: (t, 6, 3) m, oriented outwards.  potential: (t, 6) A.  magnetisation: (t, 3) A/m, M₀ of the body
+    inside.  susceptibility: (t,), χ = recoil permeability − 1.
+    """
+
+    nodes: Floats
+    potential: Floats
+    magnetisation: Floats
+    susceptibility: Floats
+
+    def jet(self, points: Points, order: int) -> Jet:
+        """(B, gradient[, hessian]) at `points` (n, 3) m, as `Evaluated.evaluate` wants them."""
+        points = np.ascontiguousarray(points, dtype=float)
+        count = points.shape[0]
+        B = np.zeros((count, 3))
+        gradient = np.zeros((count if order > 0 else 0, 3, 3))
+        hessian = np.zeros((count if order > 1 else 0, 3, 3, 3))
+        centre = self.nodes[:, :3].mean(axis=1)
+        size = np.linalg.norm(self.nodes[:, :3] - centre[:, None], axis=-1).max(axis=1)
+        far, near = _rule(4), _rule(8)
+        places, strengths = zip(*(self._elements(rule[0], rule[1]) for rule in (far, near)), strict=True)
+        barycentric = np.column_stack([1 - near[0].sum(axis=1), near[0]])
+
+        def run(chunk: slice) -> None:
+            _evaluate(
+                points[chunk], self.nodes, self.potential, self.magnetisation, self.susceptibility,
+                centre, size, places[0], strengths[0], places[1], strengths[1], barycentric, near[1],
+                order, B[chunk], gradient[chunk], hessian[chunk],
+            )
+
+        in_chunks(run, count, at_least=16)
+        return (B, gradient, hessian)[: order + 1]
+
+    def _elements(self, local: Floats, weights: Floats) -> tuple[Floats, Floats]:
+        """Current elements of a rule: places (t, q, 3) m and strengths K·w (t, q, 3) A·m."""
+        shapes, du, dv = triangle_shapes(local)
+        places = np.einsum("qa,tai->tqi", shapes, self.nodes)
+        xu, xv = (np.einsum("qa,tai->tqi", d, self.nodes) for d in (du, dv))
+        pu, pv = (np.einsum("qa,ta->tq", d, self.potential)[..., None] for d in (du, dv))
+        bound = np.cross(self.magnetisation[:, None], np.cross(xu, xv))
+        current = bound - self.susceptibility[:, None, None] * (xu * pv - xv * pu)
+        return places, current * weights[:, None]
+
+    @property
+    def moment(self) -> Floats:
+        """Dipole moment (3,) A·m²: ½ ∮ x × K dS."""
+        places, strengths = self._elements(*_rule(8))
+        total: Floats = 0.5 * np.cross(places, strengths).sum(axis=(0, 1))
+        return total
+
+
+@cache
+def _rule(order: int) -> tuple[Floats, Floats]:
+    """Quadrature points (q, 2) and weights (q,) on the unit triangle, exact to degree `order`."""
+    from skfem.quadrature import get_quadrature
+    from skfem.refdom import RefTri
+
+    points, weights = get_quadrature(RefTri, order)
+    return np.ascontiguousarray(points.T), np.ascontiguousarray(weights)
+
+
+@kernel
+def _add_element(
+    rx: float, ry: float, rz: float, kx: float, ky: float, kz: float,
+    order: int, B: Floats, gradient: Floats, hessian: Floats,
+) -> None:
+    """Add K × r/r³ and its derivatives with respect to the point; r leads from the element to the point."""
+    r2 = rx * rx + ry * ry + rz * rz
+    i3 = 1.0 / (r2 * np.sqrt(r2))
+    cx, cy, cz = ky * rz - kz * ry, kz * rx - kx * rz, kx * ry - ky * rx
+    B[0] += cx * i3
+    B[1] += cy * i3
+    B[2] += cz * i3
+    if order < 1:
+        return
+    # ∂_j (K × r)_i i3 = ε_iaj K_a i3 − 3 c_i r_j / r⁵
+    i5 = -3.0 * i3 / r2
+    gradient[0, 0] += cx * rx * i5
+    gradient[0, 1] += cx * ry * i5 - kz * i3
+    gradient[0, 2] += cx * rz * i5 + ky * i3
+    gradient[1, 0] += cy * rx * i5 + kz * i3
+    gradient[1, 1] += cy * ry * i5
+    gradient[1, 2] += cy * rz * i5 - kx * i3
+    gradient[2, 0] += cz * rx * i5 - ky * i3
+    gradient[2, 1] += cz * ry * i5 + kx * i3
+    gradient[2, 2] += cz * rz * i5
+    if order < 2:
+        return
+    i7 = -5.0 * i5 / r2
+    r = (rx, ry, rz)
+    c = (cx, cy, cz)
+    e = ((0.0, -kz, ky), (kz, 0.0, -kx), (-ky, kx, 0.0))
+    for i in range(3):
+        for j in range(3):
+            for k in range(3):
+                value = c[i] * r[j] * r[k] * i7 + (e[i][j] * r[k] + e[i][k] * r[j]) * i5
+                if j == k:
+                    value += c[i] * i5
+                hessian[i, j, k] += value
+
+
+@kernel
+def _evaluate(
+    points: Points, nodes: Floats, potential: Floats, magnetisation: Floats, susceptibility: Floats,
+    centre: Floats, size: Floats, far_places: Floats, far_strengths: Floats,
+    near_places: Floats, near_strengths: Floats, barycentric: Floats, weights: Floats,
+    order: int, B: Floats, gradient: Floats, hessian: Floats,
+) -> None:
+    """Sum all triangles at all points, each by the rule that its distance asks for."""
+    stack = np.empty((4 * _DEEPEST, 7))  # corner coordinates of sub-triangles, and their depth
+    b = np.empty(3)
+    g = np.zeros((3, 3))
+    h = np.zeros((3, 3, 3))
+    for i in range(points.shape[0]):
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
+        b[:] = 0.0
+        g[:] = 0.0
+        h[:] = 0.0
+        for t in range(nodes.shape[0]):
+            dx, dy, dz = x - centre[t, 0], y - centre[t, 1], z - centre[t, 2]
+            ratio2 = (dx * dx + dy * dy + dz * dz) / (size[t] * size[t])
+            if ratio2 > _FAR * _FAR:
+                for q in range(far_places.shape[1]):
+                    at, strength = far_places[t, q], far_strengths[t, q]
+                    _add_element(
+                        x - at[0], y - at[1], z - at[2], strength[0], strength[1], strength[2], order, b, g, h
+                    )
+            elif ratio2 > _NEAR * _NEAR:
+                for q in range(near_places.shape[1]):
+                    at, strength = near_places[t, q], near_strengths[t, q]
+                    _add_element(
+                        x - at[0], y - at[1], z - at[2], strength[0], strength[1], strength[2], order, b, g, h
+                    )
+            else:
+                _add_close(
+                    x, y, z, nodes[t], potential[t], magnetisation[t], susceptibility[t],
+                    barycentric, weights, order, stack, b, g, h,
+                )
+        for j in range(3):
+            B[i, j] = MU_0 / (4.0 * np.pi) * b[j]
+            if order > 0:
+                for k in range(3):
+                    gradient[i, j, k] = MU_0 / (4.0 * np.pi) * g[j, k]
+            if order > 1:
+                for k in range(3):
+                    for m in range(3):
+                        hessian[i, j, k, m] = MU_0 / (4.0 * np.pi) * h[j, k, m]
+
+
+@kernel
+def _add_close(
+    x: float, y: float, z: float, nodes: Floats, potential: Floats, magnetisation: Floats, chi: float,
+    barycentric: Floats, weights: Floats, order: int, stack: Floats, B: Floats, gradient: Floats, hessian: Floats,
+) -> None:
+    """One triangle close to the point: quarter it until every part is far enough for the 16-point rule."""
+    shape = np.empty(6)
+    du = np.empty(6)
+    dv = np.empty(6)
+    corner = np.empty((3, 3))
+    stack[0, :] = (0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0)
+    height = 1
+    while height > 0:
+        height -= 1
+        u0, v0, u1, v1, u2, v2 = (
+            stack[height, 0], stack[height, 1], stack[height, 2], stack[height, 3], stack[height, 4], stack[height, 5],
+        )
+        depth = stack[height, 6]
+        for n, (u, v) in enumerate(((u0, v0), (u1, v1), (u2, v2))):
+            _place(u, v, nodes, shape, du, dv, corner[n])
+        cx = (corner[0, 0] + corner[1, 0] + corner[2, 0]) / 3.0
+        cy = (corner[0, 1] + corner[1, 1] + corner[2, 1]) / 3.0
+        cz = (corner[0, 2] + corner[1, 2] + corner[2, 2]) / 3.0
+        extent2 = 0.0
+        for n in range(3):
+            extent2 = max(
+                extent2, (corner[n, 0] - cx) ** 2 + (corner[n, 1] - cy) ** 2 + (corner[n, 2] - cz) ** 2
+            )
+        distance2 = (x - cx) ** 2 + (y - cy) ** 2 + (z - cz) ** 2
+        if distance2 < _NEAR * _NEAR * extent2 and depth < _DEEPEST:
+            ua, va, ub, vb, uc, vc = (
+                0.5 * (u0 + u1), 0.5 * (v0 + v1), 0.5 * (u1 + u2), 0.5 * (v1 + v2), 0.5 * (u2 + u0), 0.5 * (v2 + v0),
+            )
+            stack[height, :] = (u0, v0, ua, va, uc, vc, depth + 1)
+            stack[height + 1, :] = (ua, va, u1, v1, ub, vb, depth + 1)
+            stack[height + 2, :] = (uc, vc, ub, vb, u2, v2, depth + 1)
+            stack[height + 3, :] = (ua, va, ub, vb, uc, vc, depth + 1)
+            height += 4
+            continue
+        if distance2 == 0.0:
+            continue  # the point itself: its two sides cancel
+        area = (u1 - u0) * (v2 - v0) - (u2 - u0) * (v1 - v0)
+        for q in range(weights.size):
+            u = barycentric[q, 0] * u0 + barycentric[q, 1] * u1 + barycentric[q, 2] * u2
+            v = barycentric[q, 0] * v0 + barycentric[q, 1] * v1 + barycentric[q, 2] * v2
+            p = corner[0]
+            _place(u, v, nodes, shape, du, dv, p)
+            xu = yu = zu = xv = yv = zv = pu = pv = 0.0
+            for a in range(6):
+                xu += du[a] * nodes[a, 0]
+                yu += du[a] * nodes[a, 1]
+                zu += du[a] * nodes[a, 2]
+                xv += dv[a] * nodes[a, 0]
+                yv += dv[a] * nodes[a, 1]
+                zv += dv[a] * nodes[a, 2]
+                pu += du[a] * potential[a]
+                pv += dv[a] * potential[a]
+            nx, ny, nz = yu * zv - zu * yv, zu * xv - xu * zv, xu * yv - yu * xv
+            w = weights[q] * area
+            kx = w * (magnetisation[1] * nz - magnetisation[2] * ny - chi * (xu * pv - xv * pu))
+            ky = w * (magnetisation[2] * nx - magnetisation[0] * nz - chi * (yu * pv - yv * pu))
+            kz = w * (magnetisation[0] * ny - magnetisation[1] * nx - chi * (zu * pv - zv * pu))
+            _add_element(x - p[0], y - p[1], z - p[2], kx, ky, kz, order, B, gradient, hessian)
+
+
+@kernel
+def _place(u: float, v: float, nodes: Floats, shape: Floats, du: Floats, dv: Floats, out: Floats) -> None:
+    """Shape functions and their derivatives at (u, v), and the point they map to."""
+    w = 1.0 - u - v
+    shape[0], shape[1], shape[2] = w * (2 * w - 1), u * (2 * u - 1), v * (2 * v - 1)
+    shape[3], shape[4], shape[5] = 4 * u * w, 4 * u * v, 4 * v * w
+    du[0], du[1], du[2], du[3], du[4], du[5] = 1 - 4 * w, 4 * u - 1, 0.0, 4 * (w - u), 4 * v, -4 * v
+    dv[0], dv[1], dv[2], dv[3], dv[4], dv[5] = 1 - 4 * w, 0.0, 4 * v - 1, -4 * u, 4 * u, 4 * (w - v)
+    for i in range(3):
+        out[i] = 0.0
+        for a in range(6):
+            out[i] += shape[a] * nodes[a, i]
