@@ -2,58 +2,79 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from scipy.sparse.linalg import splu
 
-from magfem.fem.linear_solver import LinearResult, solve_open
+from magfem.constants import MU_0
+from magfem.fem.discrete import Discrete
+from magfem.fem.linear_solver import solve_open
 from magfem.fem.meridian_currents import MeridianCurrents
 from magfem.fem.open_boundary import OpenBoundary, half_circle
 from magfem.mesh.mesh import Mesh
 from magfem.typing import Floats, Integers
 
 
-@dataclass(frozen=True)
-class AxisymmetricSystem:
-    """The assembled problem (everything per radian): basis, load (n,) A·m… and its open boundary."""
+def solve(mesh: Mesh, permeability: Floats, magnetisation: Floats) -> Discrete:
+    """Solve a meridian mesh whose bodies have relative `permeability` (b,) and `magnetisation` (b, 3) A/m.
 
-    basis: Any
-    load: Floats
-    boundary: OpenBoundary
-    result: LinearResult
-
-
-def solve_potential(mesh: Mesh, permeability: Floats, magnetisation: Floats) -> AxisymmetricSystem:
-    """Scalar potential of a meridian mesh.
-
-    permeability: (e,) relative.  magnetisation: (e,) A/m, remanence/µ₀ along z.
+    `magnetisation` is remanence/µ₀ and points along z. Raises ConvergenceError.
     """
     import skfem
-    from skfem import BilinearForm, LinearForm
+    from skfem import BilinearForm, Functional, LinearForm
     from skfem.helpers import dot, grad
 
     sk_mesh = scikit_mesh(mesh)
     basis = skfem.Basis(sk_mesh, skfem.ElementTriP4(), intorder=9)
     constant = basis.with_element(skfem.ElementTriP0())
+    inside = mesh.body >= 0
+    axial = magnetisation[:, 2]
+    mu = np.where(inside, permeability[mesh.body], 1.0)
+    m = np.where(inside, axial[mesh.body], 0.0)
 
     @BilinearForm
     def permeability_energy(phi, psi, w):  # type: ignore[no-untyped-def]
-        """∫ µ ∇φ·∇ψ ρ, per radian."""
+        """∫ µ ∇φ·∇ψ ρ dρdz, the volume integral per radian."""
         return w.mu * dot(grad(phi), grad(psi)) * w.x[0]
 
     @LinearForm
     def remanence_load(psi, w):  # type: ignore[no-untyped-def]
-        """∫ M₀ ∂_zψ ρ, per radian."""
+        """∫ M₀ ∂ψ/∂z ρ dρdz, M₀ = remanence/µ₀."""
         return w.m * grad(psi)[1] * w.x[0]
 
-    stiffness = permeability_energy.assemble(basis, mu=constant.interpolate(permeability)).tocsr()
-    load = remanence_load.assemble(basis, m=constant.interpolate(magnetisation))
+    @Functional
+    def revolved_volume(w):  # type: ignore[no-untyped-def]
+        """∫ 2πρ dρdz."""
+        return 2 * np.pi * w.x[0]
+
+    stiffness = permeability_energy.assemble(basis, mu=constant.interpolate(mu)).tocsr()
+    load = remanence_load.assemble(basis, m=constant.interpolate(m))
     boundary = _boundary(mesh, sk_mesh, basis)
     factors = splu((stiffness + boundary.preconditioner).tocsc())
     result = solve_open(stiffness, boundary, load, factors.solve, tolerance=1e-12)
-    return AxisymmetricSystem(basis, load, boundary, result)
+    values = result.values
+    currents = _currents(mesh, basis, values, permeability - 1.0, axial)
+    exterior = boundary.coefficients(values)
+    gradient = np.asarray(basis.interpolate(values).grad).mean(axis=-1)
+    volume = revolved_volume.elemental(basis)
+    return Discrete(
+        mesh=mesh,
+        currents=currents,
+        potential=_at_nodes(mesh, basis, values),
+        flux_density=(MU_0 * (np.stack([np.zeros_like(m), m]) - mu * gradient)).T,
+        volume=np.bincount(mesh.body[inside], volume[inside], minlength=len(mesh.names)),
+        quantities={
+            "moment": currents.moment.tolist(),
+            # φ = m cos θ/(4πr²) outside, against the orthonormal √(3/2) cos θ.
+            "boundary_moment": [0.0, 0.0, float(4 * np.pi * boundary.radius**2 * np.sqrt(3 / 2) * exterior[1])],
+            "field_energy": float(0.5 * MU_0 * 2 * np.pi * load @ values),
+            "boundary_flux": float(MU_0 * boundary.radius * 2 * np.pi * np.sqrt(2) * exterior[0]),
+        },
+        unknowns=load.size,
+        iterations=result.iterations,
+        residual=result.residual,
+    )
 
 
 def scikit_mesh(mesh: Mesh) -> Any:
@@ -98,29 +119,36 @@ def _boundary(mesh: Mesh, sk_mesh: Any, basis: Any) -> OpenBoundary:
     )
 
 
-def currents(
-    mesh: Mesh, system: AxisymmetricSystem, susceptibility: Floats, magnetisation: Floats
-) -> MeridianCurrents:
-    """Bound currents of every body: susceptibility (b,) and axial magnetisation (b,) A/m, remanence/µ₀."""
-    sk_mesh = system.basis.mesh
+def _currents(mesh: Mesh, basis: Any, values: Floats, susceptibility: Floats, axial: Floats) -> MeridianCurrents:
+    """Bound currents of every body with `susceptibility` (b,) and `axial` magnetisation (b,) A/m, remanence/µ₀."""
     nodes, current = [], []
-    t = np.linspace(-1, 1, 5)
-    to_powers = np.linalg.inv(np.vander(t, increasing=True))
+    to_powers = np.linalg.inv(np.vander(np.linspace(-1, 1, 5), increasing=True))
     for index in range(len(mesh.names)):
         facets, _ = mesh.body_facets(index)
-        number, ascending = _facet_numbers(mesh, sk_mesh, facets)
         place = mesh.points[facets]
-        # Unknowns along an edge: its corners, then three in between, which are values at quarter points.
-        ends = sk_mesh.facets[:, number]
-        inner = system.basis.facet_dofs[:, number]
-        dofs = np.concatenate([system.basis.nodal_dofs[0, ends[:1]], inner, system.basis.nodal_dofs[0, ends[1:]]])
-        values = system.result.values[np.where(ascending, dofs, dofs[::-1])]
-        powers = to_powers @ values  # (5, f), ascending powers of t
+        powers = to_powers @ values[_along_edges(mesh, basis, facets)]  # (5, f), ascending powers of t
         slope = (powers[1:] * np.arange(1, 5)[:, None]).T
         start, end, middle = (place[:, k, 1] for k in range(3))
         density = -susceptibility[index] * slope
-        density[:, 0] += magnetisation[index] * (end - start) / 2
-        density[:, 1] += magnetisation[index] * (start + end - 2 * middle)
+        density[:, 0] += axial[index] * (end - start) / 2
+        density[:, 1] += axial[index] * (start + end - 2 * middle)
         nodes.append(place)
         current.append(density)
-    return MeridianCurrents(np.ascontiguousarray(np.concatenate(nodes)), np.ascontiguousarray(np.concatenate(current)))
+    return MeridianCurrents(np.concatenate(nodes), np.ascontiguousarray(np.concatenate(current)))
+
+
+def _along_edges(mesh: Mesh, basis: Any, edges: Integers) -> Integers:
+    """Unknowns (5, f) met along oriented edges (f, 3): start, three quarter points, end."""
+    number, ascending = _facet_numbers(mesh, basis.mesh, edges)
+    ends = basis.nodal_dofs[0, basis.mesh.facets[:, number]]
+    dofs = np.concatenate([ends[:1], basis.facet_dofs[:, number], ends[1:]])
+    return np.where(ascending, dofs, dofs[::-1])
+
+
+def _at_nodes(mesh: Mesh, basis: Any, values: Floats) -> Floats:
+    """The potential (n,) at the mesh's corners and mid-edge nodes."""
+    potential = np.empty(mesh.points.shape[0])
+    for edge in ([0, 1, 3], [1, 2, 4], [2, 0, 5]):
+        nodes = mesh.cells[:, edge]
+        potential[nodes] = values[_along_edges(mesh, basis, nodes)[[0, 4, 2]].T]
+    return potential

@@ -23,8 +23,8 @@ from magfem.fem.open_boundary import triangle_shapes
 from magfem.threads import in_chunks
 from magfem.typing import Floats, Jet, Points
 
-_FAR, _NEAR = 7.0, 2.6
-"""Distance over triangle size from which 6 and 16 points integrate it; below, the triangle is quartered."""
+_FAR, _NEAR = 16.0, 3.0
+"""Distance over triangle size from which 3 and 12 points integrate it to 1e-6; below, it is quartered."""
 _DEEPEST = 24  # quarterings: a point on the surface itself gets the mean of both sides
 
 
@@ -50,7 +50,7 @@ class SurfaceCurrents:
         hessian = np.zeros((count if order > 1 else 0, 3, 3, 3))
         centre = self.nodes[:, :3].mean(axis=1)
         size = np.linalg.norm(self.nodes[:, :3] - centre[:, None], axis=-1).max(axis=1)
-        far, near = _rule(4), _rule(8)
+        far, near = _rule(2), _rule(6)
         places, strengths = zip(*(self._elements(rule[0], rule[1]) for rule in (far, near)), strict=True)
         barycentric = np.column_stack([1 - near[0].sum(axis=1), near[0]])
 
@@ -185,7 +185,7 @@ def _add_close(
     x: float, y: float, z: float, nodes: Floats, potential: Floats, magnetisation: Floats, chi: float,
     barycentric: Floats, weights: Floats, order: int, stack: Floats, B: Floats, gradient: Floats, hessian: Floats,
 ) -> None:
-    """One triangle close to the point: quarter it until every part is far enough for the 16-point rule."""
+    """One triangle close to the point: quarter it until every part is far enough for the 12-point rule."""
     shape = np.empty(6)
     du = np.empty(6)
     dv = np.empty(6)

@@ -38,9 +38,20 @@ class Field(Protocol):
 class Evaluated(ABC):
     """A field that evaluates its jet at plain (n, 3) points; everything else of the interface follows here."""
 
-    region: Region
-    unit: Unit = "T"
-    scalable: bool = True  # false for nonlinear sources, which hold at the stated currents only
+    @property
+    @abstractmethod
+    def region(self) -> Region:
+        """Where the field holds."""
+
+    @property
+    @abstractmethod
+    def unit(self) -> Unit:
+        """"T", or "T/A" for a field per ampere."""
+
+    @property
+    def scalable(self) -> bool:
+        """Whether the field is proportional to its sources; false for iron, and magnets with coils."""
+        return True
 
     @abstractmethod
     def evaluate(self, points: Points, order: int) -> Jet:
@@ -82,18 +93,18 @@ class Evaluated(ABC):
         return Placed(self, pose)
 
     def __mul__(self, factor: float) -> Scaled:
-        return Scaled(self, factor)
+        return Scaled(self, factor, "T")
 
     __rmul__ = __mul__
 
     def __neg__(self) -> Scaled:
-        return Scaled(self, -1.0)
+        return Scaled(self, -1.0, self.unit)
 
     def __add__(self, other: Field) -> Summed:
         return Summed((self, other))
 
     def __sub__(self, other: Field) -> Summed:
-        return Summed((self, Scaled(other, -1.0)))
+        return Summed((self, Scaled(other, -1.0, other.unit)))
 
 
 @dataclass(frozen=True)
@@ -104,15 +115,15 @@ class Placed(Evaluated):
     pose: RigidTransform
 
     @property
-    def region(self) -> Region:  # type: ignore[override]
+    def region(self) -> Region:
         return PlacedRegion(self.field.region, self.pose)
 
     @property
-    def unit(self) -> Unit:  # type: ignore[override]
+    def unit(self) -> Unit:
         return self.field.unit
 
     @property
-    def scalable(self) -> bool:  # type: ignore[override]
+    def scalable(self) -> bool:
         return _scalable(self.field)
 
     def evaluate(self, points: Points, order: int) -> Jet:
@@ -135,6 +146,7 @@ class Scaled(Evaluated):
 
     field: Field
     factor: float
+    unit: Unit
 
     def __post_init__(self) -> None:
         if not isinstance(self.factor, (int, float, np.floating, np.integer)):
@@ -148,12 +160,8 @@ class Scaled(Evaluated):
             )
 
     @property
-    def region(self) -> Region:  # type: ignore[override]
+    def region(self) -> Region:
         return self.field.region
-
-    @property
-    def unit(self) -> Unit:  # type: ignore[override]
-        return "T"
 
     def evaluate(self, points: Points, order: int) -> Jet:
         jet = self.field.jet(points, order, outside="extrapolate")
@@ -174,15 +182,15 @@ class Summed(Evaluated):
             )
 
     @property
-    def region(self) -> Region:  # type: ignore[override]
+    def region(self) -> Region:
         return Intersection(tuple(field.region for field in self.fields))
 
     @property
-    def unit(self) -> Unit:  # type: ignore[override]
+    def unit(self) -> Unit:
         return self.fields[0].unit
 
     @property
-    def scalable(self) -> bool:  # type: ignore[override]
+    def scalable(self) -> bool:
         return all(_scalable(field) for field in self.fields)
 
     def evaluate(self, points: Points, order: int) -> Jet:

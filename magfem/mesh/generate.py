@@ -19,7 +19,7 @@ log = logging.getLogger("magfem")
 BALL = 1.35
 """Radius of the artificial boundary over the device's: tight, yet a few elements away from the rims."""
 
-RIM_REACH, SURFACE_REACH = 2.5, 1.5
+RIM_REACH, SURFACE_REACH = 2.75, 3.0
 _GMSH_TET10 = [0, 1, 2, 3, 4, 5, 6, 7, 9, 8]  # Gmsh numbers the last two mid-edge nodes the other way round
 
 
@@ -37,14 +37,14 @@ def element_sizes(geometry: Geometry, dimension: int, resolution: float) -> Size
     feature, radius = geometry.feature_size, geometry.hull.radius
     if dimension == 3:
         return Sizes(
-            rim=0.12 * feature / resolution,
-            surface=min(0.24 * feature, 0.25 * radius) / resolution,
-            outer=0.32 * BALL * radius / resolution,
+            rim=0.05 * feature / resolution,
+            surface=min(0.22 / resolution, 0.3) * feature,  # larger ones would fold over on curved walls
+            outer=0.4 * radius / resolution,
         )
     return Sizes(
         rim=0.02 * feature / resolution,
-        surface=min(0.12 * feature, 0.1 * radius) / resolution,
-        outer=0.12 * BALL * radius / resolution,
+        surface=0.12 * feature / resolution,
+        outer=0.16 * radius / resolution,
     )
 
 

@@ -1,0 +1,52 @@
+"""magfem: from a magnet's geometry to a field model you may bet hardware on.
+
+    geometry = magfem.load_geometry("ring_magnet_4x1.5x1")
+    solution = magfem.solve(geometry)
+    model = magfem.fit(solution)
+    model.B([0, 0, 3e-3])
+
+Everything is in SI units; points are (..., 3) arrays in m, fields (..., 3) in T. Importing is cheap: Gmsh, VTK
+and the compiled kernels load on first use.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+__version__ = "0.1.0"
+
+_PUBLIC = {
+    "load_geometry": "magfem.geometry",
+    "solve": "magfem.fem",
+    "load_solution": "magfem.fem",
+    "Solution": "magfem.fem",
+    "fit": "magfem.fit",
+    "load_model": "magfem.fit",
+    "FieldModel": "magfem.fit",
+    "exact": "magfem.exact",
+    "validate": "magfem.fit",
+    "Field": "magfem.fields",
+    "Region": "magfem.fields",
+    "MagfemError": "magfem.errors",
+}
+
+__all__ = [*_PUBLIC, "__version__"]
+
+if TYPE_CHECKING:
+    from magfem.errors import MagfemError
+    from magfem.exact import exact
+    from magfem.fem import Solution, load_solution, solve
+    from magfem.fields import Field, Region
+    from magfem.fit import FieldModel, fit, load_model, validate
+    from magfem.geometry import load_geometry
+
+
+def __getattr__(name: str) -> Any:
+    if name in _PUBLIC:
+        return getattr(importlib.import_module(_PUBLIC[name]), name)
+    raise AttributeError(f"module 'magfem' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

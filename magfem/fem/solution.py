@@ -1,0 +1,134 @@
+"""A solved device: its field everywhere in space, its error statement, and the numbers that the solve gives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from magfem.errors import InputError
+from magfem.fem.discrete import Currents
+from magfem.fem.meridian_currents import MeridianCurrents
+from magfem.fem.surface_currents import SurfaceCurrents
+from magfem.fields.field import Evaluated, Unit
+from magfem.fields.region import Everywhere, Region, Shell, region_from_dict, region_to_dict
+from magfem.files import read_json, write_folder, write_json
+from magfem.mesh.export import write_mesh
+from magfem.mesh.mesh import Mesh
+from magfem.typing import Floats, Jet, Points
+
+@dataclass(frozen=True, eq=False)
+class Solution(Evaluated):
+    """The finite-element solution of a device; a Field in T, inside the bodies too.
+
+    error: stated bounds `B` and `gradient`, relative, over the device's region (the norm of `fields.norms`).
+    quantities: numbers of the solve in SI units.  stats: unknowns, cells, seconds, peak_bytes, iterations.
+    device: kind, name, card and material of what was solved.  settings: dimension and resolution.
+    device_region: where a model of the device must hold, and where `error` holds.
+    """
+
+    currents: Currents
+    mesh: Mesh
+    potential: Floats  # (n,) A at the mesh's nodes
+    flux_density: Floats  # (e, d) T in every cell's middle, by differentiating: for pictures only
+    error: dict[str, Any]
+    quantities: dict[str, Any]
+    stats: dict[str, Any]
+    device: dict[str, Any]
+    settings: dict[str, Any]
+    device_region: Shell
+
+    @property
+    def region(self) -> Region:
+        """Everywhere; the stated error holds in `device_region`."""
+        return Everywhere()
+
+    @property
+    def unit(self) -> Unit:
+        return "T"
+
+    @property
+    def moment(self) -> Floats:
+        """Magnetic dipole moment (3,) A·m²."""
+        return self.currents.moment
+
+    def evaluate(self, points: Points, order: int) -> Jet:
+        return self.currents.jet(points, order)
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """What summary.json holds."""
+        return {
+            "format": "magfem-solution",
+            "version": 1,
+            "device": self.device,
+            "settings": self.settings,
+            "error": self.error,
+            "quantities": self.quantities,
+            "stats": self.stats,
+            "region": region_to_dict(self.device_region),
+        }
+
+    def save(self, folder: str | Path) -> None:
+        """Write solution.vtu (for ParaView), fields.npz (every bit) and summary.json, or nothing at all."""
+        write_folder(Path(folder), self._fill)
+
+    def _fill(self, folder: Path) -> None:
+        write_json(folder / "summary.json", self.summary)
+        arrays = {
+            "points": self.mesh.points,
+            "cells": self.mesh.cells,
+            "body": self.mesh.body,
+            "names": np.array(self.mesh.names),
+            "radius": np.array(self.mesh.radius),
+            "potential": self.potential,
+            "flux_density": self.flux_density,
+        }
+        np.savez(folder / "fields.npz", **arrays, **{f"currents_{k}": v for k, v in vars(self.currents).items()})
+        write_mesh(
+            self.mesh,
+            folder / "solution.vtu",
+            point_data={"potential": self.potential},
+            cell_data={"B": _three(self.flux_density)},
+        )
+
+
+def load_solution(folder: str | Path) -> Solution:
+    """Read back what `Solution.save` wrote; InputError when the folder is not a saved solution."""
+    folder = Path(folder)
+    summary = read_json(folder / "summary.json", "a solution's summary.json")
+    if not isinstance(summary, dict) or summary.get("format") != "magfem-solution":
+        raise InputError(f"this folder holds no saved solution [{folder}]")
+    try:
+        with np.load(folder / "fields.npz") as stored:
+            arrays = dict(stored)
+    except (OSError, ValueError) as error:
+        raise InputError(f"the solution's fields cannot be read: {error} [{folder / 'fields.npz'}]") from None
+    currents = {k.removeprefix("currents_"): v for k, v in arrays.items() if k.startswith("currents_")}
+    region = region_from_dict(summary["region"])
+    assert isinstance(region, Shell)
+    return Solution(
+        currents=SurfaceCurrents(**currents) if summary["settings"]["dimension"] == 3 else MeridianCurrents(**currents),
+        mesh=Mesh(
+            points=arrays["points"],
+            cells=arrays["cells"],
+            body=arrays["body"],
+            names=tuple(str(name) for name in arrays["names"]),
+            radius=float(arrays["radius"]),
+        ),
+        potential=arrays["potential"],
+        flux_density=arrays["flux_density"],
+        error=summary["error"],
+        quantities=summary["quantities"],
+        stats=summary["stats"],
+        device=summary["device"],
+        settings=summary["settings"],
+        device_region=region,
+    )
+
+
+def _three(vectors: Floats) -> Floats:
+    """Vectors (n, 2) of the half plane as (n, 3); (n, 3) stay."""
+    return vectors if vectors.shape[1] == 3 else np.column_stack([vectors, np.zeros(len(vectors))])

@@ -1,0 +1,162 @@
+"""From a geometry to its solution: mesh, solve, and the error statement that comes with it."""
+
+from __future__ import annotations
+
+import logging
+import resource
+import sys
+import time
+from typing import Any
+
+import numpy as np
+
+from magfem.constants import MU_0
+from magfem.errors import ConvergenceError, InputError
+from magfem.fem import axisymmetric, scalar_potential
+from magfem.fem.discrete import Discrete
+from magfem.fem.solution import Solution
+from magfem.fields.norms import relative_errors
+from magfem.geometry import Geometry
+from magfem.mesh.generate import generate
+from magfem.mesh.mesh import check_volumes
+from magfem.typing import Floats, Points
+
+log = logging.getLogger("magfem")
+
+RESOLUTIONS = {2: (0.2, 20.0), 3: (0.3, 4.0)}
+"""Smallest and largest resolution by dimension: below, walls are not resolved; above, memory runs out."""
+
+_ORDER = {2: 2.5, 3: 1.0}
+"""Order at which the field's error falls with the element size; edges limit it (docs: theory, error estimate)."""
+_SAFETY = 3.0
+_ROUNDING = 1e-11  # nothing is stated to be better than this
+
+
+def solve(
+    geometry: Geometry, dimension: int | None = None, resolution: float = 1.0, tolerance: float | None = None
+) -> Solution:
+    """Solve a device by finite elements.
+
+    dimension: 3, or 2 for bodies of revolution with axial magnetisation (None: 2 wherever possible).
+    resolution: factor on the fineness of the mesh; doubling it halves every element.
+    tolerance: relative; refines from `resolution` until the stated error of B is below it.
+
+    The stated error compares with a second solution on elements twice as large, over random points of the
+    device's region. Raises InputError for what cannot be solved, MeshError and ConvergenceError.
+    """
+    dimension = _dimension(geometry, dimension)
+    _check_resolution(resolution, dimension)
+    if tolerance is not None and not 0 < tolerance < 1:
+        raise InputError(f"tolerance must be a relative error between 0 and 1, got {tolerance}")
+    started = time.perf_counter()
+    layers = geometry.region.layers(np.random.default_rng(0), layers=32, per_layer=40)
+    points = layers.reshape(-1, 3)
+    coarse = _jet(_discrete(geometry, dimension, resolution / 2), points)
+    while True:
+        fine = _discrete(geometry, dimension, resolution)
+        jet = _jet(fine, points)
+        error = _stated_error(coarse, jet, layers, dimension)
+        log.info("solution: %d unknowns, stated error %.1e in B, %.1e in the gradient", fine.unknowns, *error)
+        if tolerance is None or error[0] <= tolerance:
+            break
+        if 2 * resolution > RESOLUTIONS[dimension][1]:
+            raise ConvergenceError(
+                f"the stated error of B is {error[0]:.1e} at resolution {resolution:g}, the finest that fits; "
+                f"a tolerance of {tolerance:g} is out of reach"
+            )
+        resolution, coarse = 2 * resolution, jet
+    return Solution(
+        currents=fine.currents,
+        mesh=fine.mesh,
+        potential=fine.potential,
+        flux_density=fine.flux_density,
+        error={"B": error[0], "gradient": error[1], "region": geometry.region.describe()},
+        quantities=fine.quantities,
+        stats={
+            "unknowns": fine.unknowns,
+            "cells": int(fine.mesh.cells.shape[0]),
+            "iterations": fine.iterations,
+            "residual": fine.residual,
+            "seconds": time.perf_counter() - started,
+            "peak_bytes": _peak_bytes(),
+        },
+        device=describe(geometry),
+        settings={"dimension": dimension, "resolution": resolution},
+        device_region=geometry.region,
+    )
+
+
+def describe(geometry: Geometry) -> dict[str, Any]:
+    """What a device is, for provenance: kind, name, source, card and materials."""
+    return {
+        "kind": geometry.kind,
+        "name": geometry.name,
+        "source": geometry.source,
+        "card": geometry.origin and {"path": geometry.origin.path, "sha256": geometry.origin.sha256},
+        "bodies": [
+            {
+                "name": body.name,
+                "remanence": list(body.material.remanence_vector),
+                "recoil_permeability": body.material.recoil_permeability,
+            }
+            for body in geometry.bodies
+        ],
+    }
+
+
+def _dimension(geometry: Geometry, dimension: int | None) -> int:
+    if dimension is None:
+        return 2 if geometry.axisymmetric else 3
+    if dimension not in (2, 3):
+        raise InputError(f"dimension must be 2 or 3, got {dimension!r}")
+    if dimension == 2 and not geometry.axisymmetric:
+        raise InputError("only bodies of revolution with axial magnetisation can be solved in dimension 2: use 3")
+    return dimension
+
+
+def _check_resolution(resolution: float, dimension: int) -> None:
+    low, high = RESOLUTIONS[dimension]
+    if not low <= resolution <= high:
+        raise InputError(f"resolution must lie between {low:g} and {high:g} in dimension {dimension}, got {resolution:g}")
+
+
+def _discrete(geometry: Geometry, dimension: int, resolution: float) -> Discrete:
+    """One mesh, one solve."""
+    mesh = generate(geometry, dimension, resolution)
+    bodies = {body.name: body for body in geometry.bodies}
+    ordered = [bodies[name] for name in mesh.names]
+    permeability = np.array([body.material.recoil_permeability for body in ordered])
+    magnetisation = np.array([body.material.remanence_vector for body in ordered]) / MU_0
+    formulation = scalar_potential if dimension == 3 else axisymmetric
+    discrete: Discrete = formulation.solve(mesh, permeability, magnetisation)
+    expected = np.array([body.volume for body in ordered])
+    check_volumes(discrete.volume, expected, mesh.names, tolerance=1e-3)
+    return discrete
+
+
+def _jet(discrete: Discrete, points: Points) -> tuple[Floats, Floats]:
+    B, gradient = discrete.currents.jet(points, 1)
+    return B, gradient
+
+
+def _stated_error(
+    coarse: tuple[Floats, Floats], fine: tuple[Floats, Floats], layers: Points, dimension: int
+) -> tuple[float, float]:
+    """Stated errors of B and of the gradient, from solutions on elements of twice the size and of full size.
+
+    Where an error falls with order p, the fine solution's is the difference over 2^p − 1; the safety factor
+    covers what the worst point does on unstructured meshes.
+    """
+    factor = _SAFETY / (2 ** _ORDER[dimension] - 1)
+    stated = []
+    for before, after in zip(coarse, fine, strict=True):
+        shape = (*layers.shape[:2], *after.shape[1:])
+        worst = relative_errors(before.reshape(shape), after.reshape(shape)).max()
+        stated.append(max(factor * float(worst), _ROUNDING))
+    return stated[0], stated[1]
+
+
+def _peak_bytes() -> int:
+    """Peak memory of this process."""
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return int(peak if sys.platform == "darwin" else 1024 * peak)

@@ -1,0 +1,97 @@
+"""Files are written whole or not at all: to a temporary name beside the target, then renamed."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from magfem.errors import InputError
+
+
+def write_bytes(path: Path, content: bytes) -> None:
+    """Write `content` to `path` in one step; raises InputError when the place cannot be written."""
+    with _cannot_write(path):
+        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+        try:
+            with os.fdopen(handle, "wb") as file:
+                file.write(content)
+            os.chmod(name, 0o666 & ~_umask())
+            os.replace(name, path)
+        except BaseException:
+            Path(name).unlink(missing_ok=True)
+            raise
+
+
+def write_text(path: Path, content: str) -> None:
+    """Write text as UTF-8 in one step."""
+    write_bytes(path, content.encode())
+
+
+def write_json(path: Path, data: Any) -> None:
+    """Write JSON in one step; floats keep every bit, NaN and infinities are refused (ValueError)."""
+    write_text(path, to_json(data) + "\n")
+
+
+def to_json(data: Any) -> str:
+    """JSON text of plain data and NumPy arrays."""
+    return json.dumps(data, indent=1, allow_nan=False, ensure_ascii=False, default=_plain)
+
+
+def read_json(path: Path, what: str) -> Any:
+    """Parsed JSON of a file; InputError says what is wrong with it. `what` names its content for people."""
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError(f"{what} not found [{path}]") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{what} cannot be read: {error} [{path}]") from None
+    except json.JSONDecodeError as error:
+        raise InputError(f"{what} is not valid JSON (line {error.lineno}: {error.msg}) [{path}]") from None
+
+
+def write_folder(path: Path, fill: Callable[[Path], None]) -> None:
+    """Make or replace the folder `path` by what `fill` puts into an empty one."""
+    with _cannot_write(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        draft = Path(tempfile.mkdtemp(prefix=f".{path.name}.", dir=path.parent))
+        try:
+            os.chmod(draft, 0o777 & ~_umask())
+            fill(draft)
+            old = None
+            if path.exists():
+                old = Path(tempfile.mkdtemp(prefix=f".{path.name}.", dir=path.parent))
+                os.replace(path, old)
+            os.replace(draft, path)
+            if old is not None:
+                shutil.rmtree(old, ignore_errors=True)
+        except BaseException:
+            shutil.rmtree(draft, ignore_errors=True)
+            raise
+
+
+@contextmanager
+def _cannot_write(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise InputError(f"cannot write: {error.strerror or error} [{path}]") from None
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, (np.ndarray, np.generic)):
+        return value.tolist()
+    raise TypeError(f"{type(value).__name__} cannot be written as JSON")
