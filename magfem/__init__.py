@@ -21,24 +21,38 @@ _PUBLIC = {
     "solve": "magfem.fem",
     "load_solution": "magfem.fem",
     "Solution": "magfem.fem",
-    "fit": "magfem.fit",
-    "load_model": "magfem.fit",
-    "FieldModel": "magfem.fit",
-    "exact": "magfem.exact",
-    "validate": "magfem.fit",
+    "fit": "magfem.fitting",
+    "load_model": "magfem.fitting",
+    "FieldModel": "magfem.fitting",
+    "exact": "magfem.closed_form",
+    "validate": "magfem.fitting",
     "Field": "magfem.fields",
     "Region": "magfem.fields",
     "MagfemError": "magfem.errors",
 }
 
-__all__ = [*_PUBLIC, "__version__"]
+__all__ = [
+    "Field",
+    "FieldModel",
+    "MagfemError",
+    "Region",
+    "Solution",
+    "__version__",
+    "exact",
+    "fit",
+    "load_geometry",
+    "load_model",
+    "load_solution",
+    "solve",
+    "validate",
+]
 
 if TYPE_CHECKING:
+    from magfem.closed_form import exact
     from magfem.errors import MagfemError
-    from magfem.exact import exact
     from magfem.fem import Solution, load_solution, solve
     from magfem.fields import Field, Region
-    from magfem.fit import FieldModel, fit, load_model, validate
+    from magfem.fitting import FieldModel, fit, load_model, validate
     from magfem.geometry import load_geometry
 
 

@@ -14,9 +14,10 @@ import tempfile
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numba
+from numba.core import event
 
 log = logging.getLogger("magfem")
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -29,19 +30,31 @@ def kernel(function: Function) -> Function:
     arithmetic does (infinite fields on wires) instead of raising.
     """
     folder = _cache_folder()
-    previous, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(folder)
+    config: Any = numba.config
+    previous, config.CACHE_DIR = config.CACHE_DIR, str(folder)
     try:
-        compiled: Function = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
+        compiled: Any = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
     finally:
-        numba.config.CACHE_DIR = previous
-    if not any(folder.rglob(f"*.{function.__name__}-*.nbi")):
-        _announce()
-    return compiled
+        config.CACHE_DIR = previous
+    return cast(Function, compiled)
 
 
-@cache
-def _announce() -> None:
-    log.info("first use on this machine: compiling kernels, once, up to 40 s")
+class _Announcement(event.Listener):
+    """Says so, once, when a kernel of ours has to be compiled because no cached one fits."""
+
+    said = False
+
+    def on_start(self, event: Any) -> None:
+        dispatcher = event.data["dispatcher"]
+        if not self.said and dispatcher.py_func.__module__.startswith("magfem."):
+            self.said = True
+            log.info("first use on this machine: compiling kernels, once, up to 40 s")
+
+    def on_end(self, event: Any) -> None:
+        """Nothing to say."""
+
+
+event.register("numba:compile", _Announcement())  # type: ignore[no-untyped-call]
 
 
 @cache

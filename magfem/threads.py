@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
 
 import numpy as np
 
@@ -21,4 +22,4 @@ def in_chunks(run: Callable[[slice], None], count: int, at_least: int) -> None:
     pieces = 4 * workers  # points cost unequally: small pieces even that out
     bounds = np.linspace(0, count, pieces + 1).astype(int)
     with ThreadPoolExecutor(workers) as pool:
-        list(pool.map(run, (slice(a, b) for a, b in zip(bounds, bounds[1:], strict=False))))
+        list(pool.map(run, (slice(a, b) for a, b in pairwise(bounds))))

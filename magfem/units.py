@@ -149,8 +149,7 @@ def describe(value: object) -> str:
 
 def _refusal(expected: Dimension, got: str) -> InputError:
     return InputError(
-        f"expected {_article(expected.noun)} {expected.noun} with its unit, "
-        f'such as "{expected.example}", got {got}'
+        f'expected {_article(expected.noun)} {expected.noun} with its unit, such as "{expected.example}", got {got}'
     )
 
 

@@ -13,7 +13,7 @@ from magfem.fem.linear_solver import solve_open
 from magfem.fem.meridian_currents import MeridianCurrents
 from magfem.fem.open_boundary import OpenBoundary, half_circle
 from magfem.mesh.mesh import Mesh
-from magfem.typing import Floats, Integers
+from magfem.typing import Booleans, Floats, Integers
 
 
 def solve(mesh: Mesh, permeability: Floats, magnetisation: Floats) -> Discrete:
@@ -63,11 +63,15 @@ def solve(mesh: Mesh, permeability: Floats, magnetisation: Floats) -> Discrete:
         currents=currents,
         potential=_at_nodes(mesh, basis, values),
         flux_density=(MU_0 * (np.stack([np.zeros_like(m), m]) - mu * gradient)).T,
-        volume=np.bincount(mesh.body[inside], volume[inside], minlength=len(mesh.names)),
+        volume=np.bincount(mesh.body[inside], volume[inside], minlength=len(mesh.names)).astype(float),
         quantities={
             "moment": currents.moment.tolist(),
             # φ = m cos θ/(4πr²) outside, against the orthonormal √(3/2) cos θ.
-            "boundary_moment": [0.0, 0.0, float(4 * np.pi * boundary.radius**2 * np.sqrt(3 / 2) * exterior[1])],
+            "boundary_moment": [
+                0.0,
+                0.0,
+                float(4 * np.pi * boundary.radius**2 * np.sqrt(3 / 2) * exterior[1]),
+            ],
             "field_energy": float(0.5 * MU_0 * 2 * np.pi * load @ values),
             "boundary_flux": float(MU_0 * boundary.radius * 2 * np.pi * np.sqrt(2) * exterior[0]),
         },
@@ -83,8 +87,8 @@ def scikit_mesh(mesh: Mesh) -> Any:
 
     corners, numbered = np.unique(mesh.cells[:, :3], return_inverse=True)
     # Elements of third order and more number their edge unknowns from the lower to the higher corner.
-    triangles = np.sort(numbered.reshape(-1, 3), axis=1).T
-    linear = skfem.MeshTri1(mesh.points[corners].T, triangles, sort_t=False)
+    triangles = np.ascontiguousarray(np.sort(numbered.reshape(-1, 3), axis=1).T)
+    linear = skfem.MeshTri1(np.ascontiguousarray(mesh.points[corners].T), triangles, sort_t=False)
     ends = np.sort(numbered.reshape(-1, 3)[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     middle = np.empty(linear.nfacets, dtype=np.int64)
     middle[_find_facets(linear, ends)] = mesh.cells[:, 3:].ravel()
@@ -100,7 +104,7 @@ def _find_facets(sk_mesh: Any, ends: Integers) -> Integers:
     return found
 
 
-def _facet_numbers(mesh: Mesh, sk_mesh: Any, facets: Integers) -> tuple[Integers, Integers]:
+def _facet_numbers(mesh: Mesh, sk_mesh: Any, facets: Integers) -> tuple[Integers, Booleans]:
     """scikit-fem's numbers (f,) of oriented edges (f, 3), and whether each runs from low to high corner."""
     corners = np.unique(mesh.cells[:, :3])
     ends = np.searchsorted(corners, facets[:, :2])
@@ -114,9 +118,7 @@ def _boundary(mesh: Mesh, sk_mesh: Any, basis: Any) -> OpenBoundary:
     edge = skfem.FacetBasis(sk_mesh, basis.elem, facets=np.sort(facets), intorder=12)
     shapes = np.array([edge.basis[a][0].value for a in range(edge.Nbfun)])
     dofs = edge.element_dofs
-    return half_circle(
-        np.asarray(edge.global_coordinates()), np.asarray(edge.normals), shapes, edge.dx, dofs, basis.N
-    )
+    return half_circle(np.asarray(edge.global_coordinates()), np.asarray(edge.normals), shapes, edge.dx, dofs, basis.N)
 
 
 def _currents(mesh: Mesh, basis: Any, values: Floats, susceptibility: Floats, axial: Floats) -> MeridianCurrents:

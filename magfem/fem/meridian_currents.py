@@ -48,7 +48,14 @@ class MeridianCurrents:
 
         def run(chunk: slice) -> None:
             _evaluate(
-                points[chunk], self.nodes, self.current, *_GAUSS, order, B[chunk], gradient[chunk], hessian[chunk]
+                points[chunk],
+                self.nodes,
+                self.current,
+                *_GAUSS,
+                order,
+                B[chunk],
+                gradient[chunk],
+                hessian[chunk],
             )
 
         in_chunks(run, count, at_least=64)
@@ -66,8 +73,15 @@ class MeridianCurrents:
 
 @kernel
 def _evaluate(
-    points: Points, nodes: Floats, current: Floats, gauss: Floats, weights: Floats,
-    order: int, B: Floats, gradient: Floats, hessian: Floats,
+    points: Points,
+    nodes: Floats,
+    current: Floats,
+    gauss: Floats,
+    weights: Floats,
+    order: int,
+    B: Floats,
+    gradient: Floats,
+    hessian: Floats,
 ) -> None:
     """Sum all pieces at all points."""
     out = np.zeros(15)
@@ -110,6 +124,6 @@ def _evaluate(
 @kernel
 def _along(nodes: Floats, t: float, axis: int) -> float:
     """Coordinate of the quadratic piece at t ∈ [−1, 1]."""
-    return (
-        nodes[0, axis] * t * (t - 1.0) / 2.0 + nodes[1, axis] * t * (t + 1.0) / 2.0 + nodes[2, axis] * (1.0 - t * t)
-    )
+    value: float = nodes[0, axis] * t * (t - 1.0) / 2.0 + nodes[1, axis] * t * (t + 1.0) / 2.0
+    value += nodes[2, axis] * (1.0 - t * t)
+    return value

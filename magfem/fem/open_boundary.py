@@ -84,7 +84,13 @@ def sphere(mesh: Mesh, degree: int = DEGREE) -> OpenBoundary:
 
 @kernel
 def _real_harmonics(
-    directions: Points, degree: Integers, order: Integers, sine: Integers, scale: Floats, table: Complexes, out: Floats
+    directions: Points,
+    degree: Integers,
+    order: Integers,
+    sine: Integers,
+    scale: Floats,
+    table: Complexes,
+    out: Floats,
 ) -> None:
     """Real orthonormal spherical harmonics (p, k) at unit directions (p, 3)."""
     top = table.shape[0] - 1
@@ -96,7 +102,13 @@ def _real_harmonics(
 
 
 def half_circle(
-    points: Floats, normal: Floats, shapes: Floats, weights: Floats, dofs: Integers, size: int, degree: int = DEGREE
+    points: Floats,
+    normal: Floats,
+    shapes: Floats,
+    weights: Floats,
+    dofs: Integers,
+    size: int,
+    degree: int = DEGREE,
 ) -> OpenBoundary:
     """Open boundary of an axisymmetric mesh, from a facet basis on its artificial half circle.
 
@@ -142,7 +154,13 @@ def triangle_shapes(points: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def _collect(
-    facets: Integers, size: int, values: Floats, shapes: Floats, robin: Floats, degree: Integers, radius: float
+    facets: Integers,
+    size: int,
+    values: Floats,
+    shapes: Floats,
+    robin: Floats,
+    degree: Integers,
+    radius: float,
 ) -> OpenBoundary:
     """Sum facets (f, a): harmonics (f·q, k), weighted shape functions (f, q, a), and their products (f, a, a)."""
     count, rule, width = shapes.shape

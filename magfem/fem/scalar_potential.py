@@ -41,7 +41,7 @@ def solve(mesh: Mesh, permeability: Floats, magnetisation: Floats) -> Discrete:
         currents=currents,
         potential=potential,
         flux_density=_flux_density(mesh, potential, mu, m),
-        volume=np.bincount(mesh.body[inside], volume[inside], minlength=len(mesh.names)),
+        volume=np.bincount(mesh.body[inside], volume[inside], minlength=len(mesh.names)).astype(float),
         quantities={
             "moment": currents.moment.tolist(),
             "boundary_moment": dipole.tolist(),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,11 +14,13 @@ from magfem.fem.discrete import Currents
 from magfem.fem.meridian_currents import MeridianCurrents
 from magfem.fem.surface_currents import SurfaceCurrents
 from magfem.fields.field import Evaluated, Unit
-from magfem.fields.region import Everywhere, Region, Shell, region_from_dict, region_to_dict
+from magfem.fields.region import Everywhere, Region, region_to_dict
 from magfem.files import read_json, write_folder, write_json
+from magfem.geometry import Geometry, card_text, geometry_from_text
 from magfem.mesh.export import write_mesh
 from magfem.mesh.mesh import Mesh
 from magfem.typing import Floats, Jet, Points
+
 
 @dataclass(frozen=True, eq=False)
 class Solution(Evaluated):
@@ -25,10 +28,10 @@ class Solution(Evaluated):
 
     error: stated bounds `B` and `gradient`, relative, over the device's region (the norm of `fields.norms`).
     quantities: numbers of the solve in SI units.  stats: unknowns, cells, seconds, peak_bytes, iterations.
-    device: kind, name, card and material of what was solved.  settings: dimension and resolution.
-    device_region: where a model of the device must hold, and where `error` holds.
+    geometry: what was solved; `error` holds in its region.  settings: dimension and resolution.
     """
 
+    geometry: Geometry
     currents: Currents
     mesh: Mesh
     potential: Floats  # (n,) A at the mesh's nodes
@@ -36,13 +39,11 @@ class Solution(Evaluated):
     error: dict[str, Any]
     quantities: dict[str, Any]
     stats: dict[str, Any]
-    device: dict[str, Any]
     settings: dict[str, Any]
-    device_region: Shell
 
     @property
     def region(self) -> Region:
-        """Everywhere; the stated error holds in `device_region`."""
+        """Everywhere; the stated error holds in the device's region."""
         return Everywhere()
 
     @property
@@ -63,12 +64,12 @@ class Solution(Evaluated):
         return {
             "format": "magfem-solution",
             "version": 1,
-            "device": self.device,
+            "device": describe(self.geometry),
             "settings": self.settings,
             "error": self.error,
             "quantities": self.quantities,
             "stats": self.stats,
-            "region": region_to_dict(self.device_region),
+            "region": region_to_dict(self.geometry.region),
         }
 
     def save(self, folder: str | Path) -> None:
@@ -77,7 +78,7 @@ class Solution(Evaluated):
 
     def _fill(self, folder: Path) -> None:
         write_json(folder / "summary.json", self.summary)
-        arrays = {
+        arrays: dict[str, Any] = {
             "points": self.mesh.points,
             "cells": self.mesh.cells,
             "body": self.mesh.body,
@@ -95,6 +96,29 @@ class Solution(Evaluated):
         )
 
 
+def describe(geometry: Geometry) -> dict[str, Any]:
+    """What a device is, for summaries and provenance: kind, name, source, card and materials."""
+    text = card_text(geometry)
+    return {
+        "kind": geometry.kind,
+        "name": geometry.name,
+        "source": geometry.source,
+        "card": {
+            "path": geometry.origin.path if geometry.origin else "made in Python",
+            "sha256": hashlib.sha256(text.encode()).hexdigest() if not geometry.origin else geometry.origin.sha256,
+            "text": text,
+        },
+        "bodies": [
+            {
+                "name": body.name,
+                "remanence": body.material.remanence_vector.tolist(),
+                "recoil_permeability": body.material.recoil_permeability,
+            }
+            for body in geometry.bodies
+        ],
+    }
+
+
 def load_solution(folder: str | Path) -> Solution:
     """Read back what `Solution.save` wrote; InputError when the folder is not a saved solution."""
     folder = Path(folder)
@@ -107,9 +131,9 @@ def load_solution(folder: str | Path) -> Solution:
     except (OSError, ValueError) as error:
         raise InputError(f"the solution's fields cannot be read: {error} [{folder / 'fields.npz'}]") from None
     currents = {k.removeprefix("currents_"): v for k, v in arrays.items() if k.startswith("currents_")}
-    region = region_from_dict(summary["region"])
-    assert isinstance(region, Shell)
+    card = summary["device"]["card"]
     return Solution(
+        geometry=geometry_from_text(card["text"], card["path"]),
         currents=SurfaceCurrents(**currents) if summary["settings"]["dimension"] == 3 else MeridianCurrents(**currents),
         mesh=Mesh(
             points=arrays["points"],
@@ -123,9 +147,7 @@ def load_solution(folder: str | Path) -> Solution:
         error=summary["error"],
         quantities=summary["quantities"],
         stats=summary["stats"],
-        device=summary["device"],
         settings=summary["settings"],
-        device_region=region,
     )
 
 

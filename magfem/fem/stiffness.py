@@ -53,8 +53,16 @@ def assemble(mesh: Mesh, permeability: Floats, magnetisation: Floats) -> tuple[c
         points, weights = tetrahedron_rule(order)
         shapes = shape_gradients(points)
         worst = _elements(
-            mesh.points, mesh.cells, np.flatnonzero(chosen), permeability, magnetisation,
-            shapes, weights, stiffness, load, volume,
+            mesh.points,
+            mesh.cells,
+            np.flatnonzero(chosen),
+            permeability,
+            magnetisation,
+            shapes,
+            weights,
+            stiffness,
+            load,
+            volume,
         )
         if worst <= 0.0:
             raise MeshError("the mesh has elements turned inside out; a finer resolution avoids them")
@@ -62,7 +70,8 @@ def assemble(mesh: Mesh, permeability: Floats, magnetisation: Floats) -> tuple[c
     rows = np.repeat(mesh.cells, 10, axis=1).ravel().astype(np.int32)
     columns = np.tile(mesh.cells, (1, 10)).ravel().astype(np.int32)
     matrix = coo_matrix((stiffness.ravel(), (rows, columns)), shape=(n, n)).tocsr()
-    return matrix, np.bincount(mesh.cells.ravel(), load.ravel(), minlength=n), volume
+    total: Floats = np.bincount(mesh.cells.ravel(), load.ravel(), minlength=n).astype(float)
+    return matrix, total, volume
 
 
 @cache
@@ -136,7 +145,9 @@ def _elements(
             for a in range(10):
                 for i in range(3):
                     g[a, i] = (
-                        shapes[q, a, 0] * inverse[0, i] + shapes[q, a, 1] * inverse[1, i] + shapes[q, a, 2] * inverse[2, i]
+                        shapes[q, a, 0] * inverse[0, i]
+                        + shapes[q, a, 1] * inverse[1, i]
+                        + shapes[q, a, 2] * inverse[2, i]
                     ) / det
                 load[e, a] += w * (
                     magnetisation[e, 0] * g[a, 0] + magnetisation[e, 1] * g[a, 1] + magnetisation[e, 2] * g[a, 2]

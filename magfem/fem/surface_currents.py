@@ -56,9 +56,23 @@ class SurfaceCurrents:
 
         def run(chunk: slice) -> None:
             _evaluate(
-                points[chunk], self.nodes, self.potential, self.magnetisation, self.susceptibility,
-                centre, size, places[0], strengths[0], places[1], strengths[1], barycentric, near[1],
-                order, B[chunk], gradient[chunk], hessian[chunk],
+                points[chunk],
+                self.nodes,
+                self.potential,
+                self.magnetisation,
+                self.susceptibility,
+                centre,
+                size,
+                places[0],
+                strengths[0],
+                places[1],
+                strengths[1],
+                barycentric,
+                near[1],
+                order,
+                B[chunk],
+                gradient[chunk],
+                hessian[chunk],
             )
 
         in_chunks(run, count, at_least=16)
@@ -94,8 +108,16 @@ def _rule(order: int) -> tuple[Floats, Floats]:
 
 @kernel
 def _add_element(
-    rx: float, ry: float, rz: float, kx: float, ky: float, kz: float,
-    order: int, B: Floats, gradient: Floats, hessian: Floats,
+    rx: float,
+    ry: float,
+    rz: float,
+    kx: float,
+    ky: float,
+    kz: float,
+    order: int,
+    B: Floats,
+    gradient: Floats,
+    hessian: Floats,
 ) -> None:
     """Add K × r/r³ and its derivatives with respect to the point; r leads from the element to the point."""
     r2 = rx * rx + ry * ry + rz * rz
@@ -134,10 +156,23 @@ def _add_element(
 
 @kernel
 def _evaluate(
-    points: Points, nodes: Floats, potential: Floats, magnetisation: Floats, susceptibility: Floats,
-    centre: Floats, size: Floats, far_places: Floats, far_strengths: Floats,
-    near_places: Floats, near_strengths: Floats, barycentric: Floats, weights: Floats,
-    order: int, B: Floats, gradient: Floats, hessian: Floats,
+    points: Points,
+    nodes: Floats,
+    potential: Floats,
+    magnetisation: Floats,
+    susceptibility: Floats,
+    centre: Floats,
+    size: Floats,
+    far_places: Floats,
+    far_strengths: Floats,
+    near_places: Floats,
+    near_strengths: Floats,
+    barycentric: Floats,
+    weights: Floats,
+    order: int,
+    B: Floats,
+    gradient: Floats,
+    hessian: Floats,
 ) -> None:
     """Sum all triangles at all points, each by the rule that its distance asks for."""
     stack = np.empty((4 * _DEEPEST, 7))  # corner coordinates of sub-triangles, and their depth
@@ -155,19 +190,27 @@ def _evaluate(
             if ratio2 > _FAR * _FAR:
                 for q in range(far_places.shape[1]):
                     at, strength = far_places[t, q], far_strengths[t, q]
-                    _add_element(
-                        x - at[0], y - at[1], z - at[2], strength[0], strength[1], strength[2], order, b, g, h
-                    )
+                    _add_element(x - at[0], y - at[1], z - at[2], strength[0], strength[1], strength[2], order, b, g, h)
             elif ratio2 > _NEAR * _NEAR:
                 for q in range(near_places.shape[1]):
                     at, strength = near_places[t, q], near_strengths[t, q]
-                    _add_element(
-                        x - at[0], y - at[1], z - at[2], strength[0], strength[1], strength[2], order, b, g, h
-                    )
+                    _add_element(x - at[0], y - at[1], z - at[2], strength[0], strength[1], strength[2], order, b, g, h)
             else:
                 _add_close(
-                    x, y, z, nodes[t], potential[t], magnetisation[t], susceptibility[t],
-                    barycentric, weights, order, stack, b, g, h,
+                    x,
+                    y,
+                    z,
+                    nodes[t],
+                    potential[t],
+                    magnetisation[t],
+                    susceptibility[t],
+                    barycentric,
+                    weights,
+                    order,
+                    stack,
+                    b,
+                    g,
+                    h,
                 )
         for j in range(3):
             B[i, j] = MU_0 / (4.0 * np.pi) * b[j]
@@ -182,8 +225,20 @@ def _evaluate(
 
 @kernel
 def _add_close(
-    x: float, y: float, z: float, nodes: Floats, potential: Floats, magnetisation: Floats, chi: float,
-    barycentric: Floats, weights: Floats, order: int, stack: Floats, B: Floats, gradient: Floats, hessian: Floats,
+    x: float,
+    y: float,
+    z: float,
+    nodes: Floats,
+    potential: Floats,
+    magnetisation: Floats,
+    chi: float,
+    barycentric: Floats,
+    weights: Floats,
+    order: int,
+    stack: Floats,
+    B: Floats,
+    gradient: Floats,
+    hessian: Floats,
 ) -> None:
     """One triangle close to the point: quarter it until every part is far enough for the 12-point rule."""
     shape = np.empty(6)
@@ -195,7 +250,12 @@ def _add_close(
     while height > 0:
         height -= 1
         u0, v0, u1, v1, u2, v2 = (
-            stack[height, 0], stack[height, 1], stack[height, 2], stack[height, 3], stack[height, 4], stack[height, 5],
+            stack[height, 0],
+            stack[height, 1],
+            stack[height, 2],
+            stack[height, 3],
+            stack[height, 4],
+            stack[height, 5],
         )
         depth = stack[height, 6]
         for n, (u, v) in enumerate(((u0, v0), (u1, v1), (u2, v2))):
@@ -205,13 +265,16 @@ def _add_close(
         cz = (corner[0, 2] + corner[1, 2] + corner[2, 2]) / 3.0
         extent2 = 0.0
         for n in range(3):
-            extent2 = max(
-                extent2, (corner[n, 0] - cx) ** 2 + (corner[n, 1] - cy) ** 2 + (corner[n, 2] - cz) ** 2
-            )
+            extent2 = max(extent2, (corner[n, 0] - cx) ** 2 + (corner[n, 1] - cy) ** 2 + (corner[n, 2] - cz) ** 2)
         distance2 = (x - cx) ** 2 + (y - cy) ** 2 + (z - cz) ** 2
         if distance2 < _NEAR * _NEAR * extent2 and depth < _DEEPEST:
             ua, va, ub, vb, uc, vc = (
-                0.5 * (u0 + u1), 0.5 * (v0 + v1), 0.5 * (u1 + u2), 0.5 * (v1 + v2), 0.5 * (u2 + u0), 0.5 * (v2 + v0),
+                0.5 * (u0 + u1),
+                0.5 * (v0 + v1),
+                0.5 * (u1 + u2),
+                0.5 * (v1 + v2),
+                0.5 * (u2 + u0),
+                0.5 * (v2 + v0),
             )
             stack[height, :] = (u0, v0, ua, va, uc, vc, depth + 1)
             stack[height + 1, :] = (ua, va, u1, v1, ub, vb, depth + 1)

@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Literal, Protocol, TypeAlias, runtime_checkable
+from typing import TYPE_CHECKING, Literal, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
 from magfem.errors import InputError, OutsideRegionError, UnitMismatchError
 from magfem.fields.region import Intersection, PlacedRegion, Region
-from magfem.typing import ArrayLike, Floats, Hessians, Jet, Outside, Points, Tensors, Vectors
+from magfem.typing import ArrayLike, Booleans, Hessians, Jet, Outside, Points, Tensors, Vectors
 
 Unit: TypeAlias = Literal["T", "T/A"]
 
@@ -38,15 +38,15 @@ class Field(Protocol):
 class Evaluated(ABC):
     """A field that evaluates its jet at plain (n, 3) points; everything else of the interface follows here."""
 
-    @property
-    @abstractmethod
-    def region(self) -> Region:
-        """Where the field holds."""
+    if TYPE_CHECKING:  # subclasses give these as properties or as dataclass fields
 
-    @property
-    @abstractmethod
-    def unit(self) -> Unit:
-        """"T", or "T/A" for a field per ampere."""
+        @property
+        def region(self) -> Region:
+            """Where the field holds."""
+
+        @property
+        def unit(self) -> Unit:
+            """ "T", or "T/A" for a field per ampere."""
 
     @property
     def scalable(self) -> bool:
@@ -211,7 +211,7 @@ def as_points(points: ArrayLike) -> Points:
     return array
 
 
-def promised_points(points: Points, region: Region, outside: Outside) -> Floats:
+def promised_points(points: Points, region: Region, outside: Outside) -> Booleans:
     """Which of `points` (n, 3) get a value: all for "extrapolate", those of the region for "nan"."""
     if outside not in ("raise", "nan", "extrapolate"):
         raise InputError(f'outside must be "raise", "nan" or "extrapolate", got {outside!r}')

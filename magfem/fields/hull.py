@@ -60,9 +60,7 @@ class CylinderHull:
         u, side = rng.random(shape), np.where(rng.random(shape) < 0.5, -1.0, 1.0)
         on_wall, on_face = pick < wall, (pick >= wall) & (pick < wall + faces)
         polar = _torus_angle(u, radius, d)
-        rho = np.where(
-            on_wall, radius + d, np.where(on_face, radius * np.sqrt(u), radius + d * np.sin(polar))
-        )
+        rho = np.where(on_wall, radius + d, np.where(on_face, radius * np.sqrt(u), radius + d * np.sin(polar)))
         z = np.where(
             on_wall,
             self.length * (u - 0.5),

@@ -35,7 +35,7 @@ _SERIES_BELOW = 0.12  # β²/α²; the series then needs at most 20 terms, the d
 def _series(p: float, j: int, leading: float, alpha: float, ratio: float) -> float:
     """T(j, p) = leading·α^{−p} ₂F₁(p/2, (p+1)/2; j+1; β²/α²), for small β²/α²; leading = T(j, p) at β = 0, α = 1."""
     a, b, c = p / 2, (p + 1) / 2, j + 1.0
-    term = leading * alpha**-p
+    term: float = leading * alpha**-p
     total = term
     for n in range(60):
         term *= (a + n) * (b + n) / ((c + n) * (1.0 + n)) * ratio

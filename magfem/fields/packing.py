@@ -19,7 +19,13 @@ def unpack_gradient(packed: Floats, gradient: Floats) -> None:
 def unpack_hessian(packed: Floats, hessian: Floats) -> None:
     """The symmetric, trace-free (3, 3, 3) from its seven numbers."""
     xxx, xxy, xxz, xyy, xyz, yyy, yyz = (
-        packed[8], packed[9], packed[10], packed[11], packed[12], packed[13], packed[14],
+        packed[8],
+        packed[9],
+        packed[10],
+        packed[11],
+        packed[12],
+        packed[13],
+        packed[14],
     )
     xzz, yzz, zzz = -xxx - xyy, -xxy - yyy, -xxz - yyz
     hessian[0, 0, 0], hessian[0, 0, 1], hessian[0, 0, 2] = xxx, xxy, xxz

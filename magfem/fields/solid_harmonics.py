@@ -53,10 +53,10 @@ def fill_table(x: float, y: float, z: float, top: int, widest: int, table: Compl
 @kernel
 def _entry(table: Complexes, degree: int, order: int) -> complex:
     """J_l^m for either sign of m."""
+    value: complex = table[degree, abs(order)]
     if order >= 0:
-        return table[degree, order]
-    value = table[degree, -order].conjugate()
-    return -value if order % 2 else value
+        return value
+    return -value.conjugate() if order % 2 else value.conjugate()
 
 
 @kernel

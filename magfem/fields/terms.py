@@ -71,9 +71,7 @@ class Terms:
                 local = np.array([0.0, 0.0, np.pi * self.radius[k] ** 2 * self.coefficient[run].sum()])
             else:
                 local = np.zeros(3)
-                for m, sine, value in zip(
-                    self.order[run], self.sine[run], _of_degree_one(self, run), strict=True
-                ):
+                for m, sine, value in zip(self.order[run], self.sine[run], _of_degree_one(self, run), strict=True):
                     local[2 if m == 0 else (1 if sine else 0)] += value
                 local *= 4 * np.pi / MU_0 * self.radius[k] ** 3
             total += self.frame[k] @ local
@@ -84,15 +82,27 @@ class Terms:
         points = np.ascontiguousarray(points, dtype=float)
         count = points.shape[0]
         results = [np.empty((count, *(3,) * rank)) for rank in range(1, order + 2)]
-        work = [array if rank <= order else np.empty((0, *(3,) * (rank + 1)))
-                for rank, array in enumerate(results + [np.empty(0)] * (2 - order))]
+        work = [
+            array if rank <= order else np.empty((0, *(3,) * (rank + 1)))
+            for rank, array in enumerate(results + [np.empty(0)] * (2 - order))
+        ]
         coefficients = _complex_coefficients(self)
 
         def run(chunk: slice) -> None:
             parts = [array[chunk] if rank <= order else array for rank, array in enumerate(work)]
             _evaluate(
-                points[chunk], self.kind, self.centre, self.frame, self.radius, self.start,
-                self.degree, self.order, self.coefficient, coefficients, order, *parts,
+                points[chunk],
+                self.kind,
+                self.centre,
+                self.frame,
+                self.radius,
+                self.start,
+                self.degree,
+                self.order,
+                self.coefficient,
+                coefficients,
+                order,
+                *parts,
             )
 
         in_chunks(run, count, _PARALLEL_FROM)
@@ -172,9 +182,7 @@ def _of_degree_one(terms: Terms, run: slice) -> Floats:
 def _complex_coefficients(terms: Terms) -> Complexes:
     """C_lm of every coefficient (c,); loops take no part."""
     owner = np.repeat(np.arange(terms.kind.size), np.diff(terms.start))
-    scale = np.array(
-        [schmidt_scale(n, m) for n, m in zip(terms.degree.tolist(), terms.order.tolist(), strict=True)]
-    )
+    scale = np.array([schmidt_scale(n, m) for n, m in zip(terms.degree.tolist(), terms.order.tolist(), strict=True)])
     part = np.where(terms.sine == 1, -1j, 1.0)
     complexes: Complexes = terms.radius[owner] * scale * part * terms.coefficient
     return complexes
@@ -220,7 +228,16 @@ def _evaluate(
                 add_loop(x, y, z, radius[k], current[a], order, local)
             else:
                 add_harmonics(
-                    x, y, z, radius[k], degree[a:b], harmonic_order[a:b], coefficients[a:b], order, table, local
+                    x,
+                    y,
+                    z,
+                    radius[k],
+                    degree[a:b],
+                    harmonic_order[a:b],
+                    coefficients[a:b],
+                    order,
+                    table,
+                    local,
                 )
             if k + 1 == kind.size or not _same_frame(frame, k, k + 1):
                 _add_rotated(f, local, order, work, half, total)
@@ -242,9 +259,7 @@ def _same_frame(frame: Floats, k: int, other: int) -> bool:
 
 
 @kernel
-def _add_rotated(
-    f: Floats, local: Floats, order: int, work: Floats, half: Floats, total: Floats
-) -> None:
+def _add_rotated(f: Floats, local: Floats, order: int, work: Floats, half: Floats, total: Floats) -> None:
     """Add a jet of the frame f (columns: its axes) to `total`, turned into the common frame."""
     if f[0, 0] == 1.0 and f[1, 1] == 1.0 and f[2, 2] == 1.0:
         for i in range(3 if order == 0 else 8 if order == 1 else 15):
@@ -261,9 +276,7 @@ def _add_rotated(
             total[3 + n] += f[j, 0] * half[0, i, 0] + f[j, 1] * half[0, i, 1] + f[j, 2] * half[0, i, 2]
     if order > 1:
         unpack_hessian(local, work)
-        for n, (i, j, k) in enumerate(
-            ((0, 0, 0), (0, 0, 1), (0, 0, 2), (0, 1, 1), (0, 1, 2), (1, 1, 1), (1, 1, 2))
-        ):
+        for n, (i, j, k) in enumerate(((0, 0, 0), (0, 0, 1), (0, 0, 2), (0, 1, 1), (0, 1, 2), (1, 1, 1), (1, 1, 2))):
             value = 0.0
             for a in range(3):
                 for b in range(3):

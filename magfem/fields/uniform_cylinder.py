@@ -70,9 +70,7 @@ def newton_derivatives(points: ArrayLike, radius: float, length: float, order: i
     return tuple(_cartesian(u, x, y, n) * radius ** (2 - n) for n in range(2, order + 1))
 
 
-def cylinder_jet(
-    points: ArrayLike, radius: float, length: float, magnetisation: ArrayLike, order: int = 1
-) -> Jet:
+def cylinder_jet(points: ArrayLike, radius: float, length: float, magnetisation: ArrayLike, order: int = 1) -> Jet:
     """Field of a uniformly magnetised solid cylinder, with its derivatives, inside and outside.
 
     Parameters
@@ -88,9 +86,7 @@ def cylinder_jet(
     The surface belongs to the magnet; the rims as in `newton_derivatives`.
     """
     m = np.asarray(magnetisation, dtype=float)
-    b, *derivatives = (
-        mu_0 * (tensor @ m) for tensor in newton_derivatives(points, radius, length, order + 2)
-    )
+    b, *derivatives = (mu_0 * (tensor @ m) for tensor in newton_derivatives(points, radius, length, order + 2))
     x, y, z = np.moveaxis(np.asarray(points, dtype=float) / radius, -1, 0)
     inside = _beside(z, length / (2 * radius)) & (x**2 + y**2 <= 1)
     return b + mu_0 * m * inside[..., None], *derivatives
@@ -175,9 +171,7 @@ def _moment(degree: int, half: float, radius: float) -> float:
     mean = 0.0
     for j in range(degree // 2 + 1):
         n = degree - 2 * j
-        mean += (
-            (-0.25) ** j * comb(degree, n) * comb(2 * j, j) * radius ** (2 * j) / (j + 1) * half**n / (n + 1)
-        )
+        mean += (-0.25) ** j * comb(degree, n) * comb(2 * j, j) * radius ** (2 * j) / (j + 1) * half**n / (n + 1)
     return mean
 
 
@@ -264,9 +258,7 @@ class _Rim(NamedTuple):
         sn, cn, dn, _ = ellipj(quarter * (np.arange(NODES // 2) + 0.5) / NODES, modulus)
         # The other half by t → K − t: there ellipj would lose relative accuracy.
         root = np.sqrt(1 - modulus)
-        sn, cn, dn = (
-            np.concatenate(pair, axis=-1) for pair in ((sn, cn / dn), (cn, root * sn / dn), (dn, root / dn))
-        )
+        sn, cn, dn = (np.concatenate(pair, axis=-1) for pair in ((sn, cn / dn), (cn, root * sn / dn), (dn, root / dn)))
         w = np.sqrt(nearest * sn**2 + farthest * cn**2)
         return cls(rho, w, (2 * sn * cn) ** 2, 2 * cn**2, 4 * quarter / NODES * dn)
 

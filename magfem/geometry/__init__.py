@@ -4,9 +4,10 @@ from magfem.geometry.body import Body
 from magfem.geometry.card import CardOrigin
 from magfem.geometry.cylinder_magnet import CylinderMagnet
 from magfem.geometry.geometry import Geometry
-from magfem.geometry.load import load_geometry
+from magfem.geometry.load import geometry_from_text, load_geometry
 from magfem.geometry.material import AXIAL, DIAMETRIC, PermanentMagnet
 from magfem.geometry.ring_magnet import RingMagnet
+from magfem.geometry.write import card_text
 
 __all__ = [
     "AXIAL",
@@ -17,5 +18,7 @@ __all__ = [
     "Geometry",
     "PermanentMagnet",
     "RingMagnet",
+    "card_text",
+    "geometry_from_text",
     "load_geometry",
 ]

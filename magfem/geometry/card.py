@@ -22,6 +22,7 @@ class CardOrigin:
 
     path: str  # as the user gave it, or `geometries/<name>.toml` for a card of the catalogue
     sha256: str  # of the file's bytes, hexadecimal
+    text: str  # the whole card, so that models and solutions carry it with them
 
 
 @dataclass(frozen=True)
@@ -127,6 +128,12 @@ def read_table(file: Path, shown: str) -> Table:
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else None
         raise CardError(f"cannot be read: {reason or 'not a path'}", name) from None
+    return parse_table(data, shown)
+
+
+def parse_table(data: bytes, shown: str) -> Table:
+    """Parse a TOML file's bytes; `shown` is how messages name the file. Raises CardError."""
+    name = one_line(shown)
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -139,7 +146,7 @@ def read_table(file: Path, shown: str) -> Table:
     except ValueError as error:  # TOMLDecodeError, or Python's own limit on the digits of an integer
         reason, place = _toml_complaint(str(error), text)
         raise CardError(f"not valid TOML: {reason}", f"{name}{place}") from None
-    return Table(CardOrigin(shown, sha256(data).hexdigest()), values)
+    return Table(CardOrigin(shown, sha256(data).hexdigest(), text), values)
 
 
 def _toml_complaint(message: str, text: str) -> tuple[str, str]:

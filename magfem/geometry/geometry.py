@@ -15,6 +15,7 @@ class Geometry(Protocol):
     """A device in its source frame: z is the axis of revolution, the origin the body's centre."""
 
     kind: ClassVar[str]  # as cards write it
+    dimensions: ClassVar[tuple[str, ...]]  # names of the lengths that a card's [dimensions] holds
 
     @property
     def name(self) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from difflib import get_close_matches
 
 from magfem.errors import InputError
-from magfem.geometry.card import Table, read_table
+from magfem.geometry.card import Table, parse_table, read_table
 from magfem.geometry.catalogue import resolve, short_path
 from magfem.geometry.cylinder_magnet import CylinderMagnet
 from magfem.geometry.geometry import Geometry
@@ -29,7 +29,15 @@ def load_geometry(name_or_path: str | os.PathLike[str]) -> Geometry:
     if not isinstance(name_or_path, str | os.PathLike):
         raise InputError(f"expected a device card's name or path, got {describe(name_or_path)}")
     where = ("geometries", name_or_path, ".toml")
-    card = read_table(resolve(*where), short_path(*where))
+    return _device(read_table(resolve(*where), short_path(*where)))
+
+
+def geometry_from_text(text: str, shown: str) -> Geometry:
+    """The device of a card's text; `shown` is how messages name it. Raises CardError."""
+    return _device(parse_table(text.encode(), shown))
+
+
+def _device(card: Table) -> Geometry:
     return KINDS[_kind(card)](card)
 
 

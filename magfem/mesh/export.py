@@ -14,7 +14,10 @@ from magfem.typing import Floats
 
 
 def write_mesh(
-    mesh: Mesh, path: Path, point_data: dict[str, Floats] | None = None, cell_data: dict[str, Floats] | None = None
+    mesh: Mesh,
+    path: Path,
+    point_data: dict[str, Floats] | None = None,
+    cell_data: dict[str, Floats] | None = None,
 ) -> None:
     """Write a mesh (lengths in m; `body` is −1 in air) and data on it, whole or not at all.
 

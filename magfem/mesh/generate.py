@@ -19,7 +19,8 @@ log = logging.getLogger("magfem")
 BALL = 1.35
 """Radius of the artificial boundary over the device's: tight, yet a few elements away from the rims."""
 
-RIM_REACH, SURFACE_REACH = 2.75, 3.0
+_RIM_REACH, _SURFACE_REACH = 2.75, 3.0
+"""How far the elements take to grow to their outer size, over the growth: slow growth matters more than small rims."""
 _GMSH_TET10 = [0, 1, 2, 3, 4, 5, 6, 7, 9, 8]  # Gmsh numbers the last two mid-edge nodes the other way round
 
 
@@ -38,7 +39,7 @@ def element_sizes(geometry: Geometry, dimension: int, resolution: float) -> Size
     if dimension == 3:
         return Sizes(
             rim=0.05 * feature / resolution,
-            surface=min(0.22 / resolution, 0.3) * feature,  # larger ones would fold over on curved walls
+            surface=min(0.15 / resolution, 0.2) * feature,  # larger ones would misshape curved walls
             outer=0.4 * radius / resolution,
         )
     return Sizes(
@@ -67,11 +68,7 @@ def generate(geometry: Geometry, dimension: int, resolution: float = 1.0) -> Mes
         owner = [name for name in names for _ in bodies[name]]
         _, pieces = occ.fragment([(dimension, space)], parts)
         occ.synchronize()
-        body_of = {
-            tag: names.index(name)
-            for name, piece in zip(owner, pieces[1:], strict=True)
-            for _, tag in piece
-        }
+        body_of = {tag: names.index(name) for name, piece in zip(owner, pieces[1:], strict=True) for _, tag in piece}
         _size_fields(gmsh, dimension, list(body_of), sizes, BALL * geometry.hull.radius)
         gmsh.option.setNumber("Mesh.Algorithm3D", 10)  # HXT: three times faster than Delaunay
         gmsh.option.setNumber("Mesh.HighOrderOptimize", 0)
@@ -115,13 +112,17 @@ def _size_fields(gmsh: Any, dimension: int, bodies: list[int], sizes: Sizes, rad
 
     kinds = ("CurvesList", "SurfacesList") if dimension == 3 else ("PointsList", "CurvesList")
     fields = [
-        threshold(kinds[0], edges, sizes.rim, sizes.outer, RIM_REACH * (sizes.outer - sizes.rim)),
-        threshold(kinds[1], walls, sizes.surface, sizes.outer, SURFACE_REACH * (sizes.outer - sizes.surface)),
+        threshold(kinds[0], edges, sizes.rim, sizes.outer, _RIM_REACH * (sizes.outer - sizes.rim)),
+        threshold(kinds[1], walls, sizes.surface, sizes.outer, _SURFACE_REACH * (sizes.outer - sizes.surface)),
     ]
     smallest = field.add("Min")
     field.setNumbers(smallest, "FieldsList", fields)
     field.setAsBackgroundMesh(smallest)
-    for option in ("Mesh.MeshSizeExtendFromBoundary", "Mesh.MeshSizeFromPoints", "Mesh.MeshSizeFromCurvature"):
+    for option in (
+        "Mesh.MeshSizeExtendFromBoundary",
+        "Mesh.MeshSizeFromPoints",
+        "Mesh.MeshSizeFromCurvature",
+    ):
         gmsh.option.setNumber(option, 0)
     gmsh.option.setNumber("Mesh.MeshSizeMax", sizes.outer)
 
@@ -147,10 +148,7 @@ def _read(gmsh: Any, dimension: int, body_of: dict[int, int], names: tuple[str, 
     index[np.asarray(tags, dtype=np.int64)] = np.arange(tags.size)
     numbered = numbered.reshape(all_cells.shape)
     points = points[index[used]][:, :dimension].copy()
-    if dimension == 3:
-        numbered = numbered[:, _GMSH_TET10]
-    else:
-        numbered = _counter_clockwise(points, numbered)
+    numbered = numbered[:, _GMSH_TET10] if dimension == 3 else _counter_clockwise(points, numbered)
     return Mesh(
         points=points,
         cells=np.ascontiguousarray(numbered),

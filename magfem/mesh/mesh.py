@@ -49,7 +49,7 @@ class Mesh:
         lonely = facets[count == 1]
         if self.dimension == 2:  # the axis of revolution is no boundary
             lonely = lonely[np.abs(self.points[lonely[:, 2], 0]) > 1e-9 * self.radius]
-        return lonely
+        return np.asarray(lonely)
 
     def body_facets(self, index: int) -> tuple[Integers, Integers]:
         """The surface of a body, oriented outwards: facets (f, 6) or (f, 3), and the cell (f,) each belongs to."""

@@ -1,0 +1,244 @@
+"""From field data to a field model: sample, solve, choose the order, and say how good the result is."""
+
+from __future__ import annotations
+
+import datetime
+import importlib.metadata
+import logging
+import platform
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from magfem.errors import ConvergenceError, InputError
+from magfem.fem.solution import Solution, describe
+from magfem.fields.field import Field
+from magfem.fields.norms import relative_errors
+from magfem.fields.region import Everywhere, Shell
+from magfem.fields.terms import Terms
+from magfem.fitting.families import FAMILIES, Candidate, dissertation_families, family_of
+from magfem.fitting.least_squares import LeastSquares, solve_least_squares
+from magfem.fitting.model import FieldModel, terms_to_list
+from magfem.fitting.recipe import Recipe
+from magfem.geometry import Geometry
+from magfem.typing import Booleans, Floats, Points
+
+log = logging.getLogger("magfem")
+
+CONDITION = 1e7
+"""Largest condition number of the scaled columns that a model may have."""
+
+_GRADIENT_WEIGHT = 0.1  # relative errors of the gradient weigh a tenth of those of B, as the targets do
+_SAFETY = 1.5  # on the held-out maximum: other random points may hit a little harder
+_SAMPLES = {"training": (28, 24), "selection": (24, 24), "heldout": (64, 34)}  # layers, points in each
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Field data on layers of equal hull distance: points, B and gradient, shapes (l, p, …)."""
+
+    points: Points
+    B: Floats
+    gradient: Floats
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A candidate with its parameters, and its errors on the points that chose it and on held-out ones."""
+
+    candidate: Candidate
+    solved: LeastSquares
+    selection: dict[str, Any]
+
+
+def fit(source: Field, recipe: Recipe | None = None) -> FieldModel:
+    """Fit a field model to a solution, or to any Field of a device.
+
+    recipe: family, targets and seed; by default what suits the device. A source that is not a Solution must
+    bring its device as `source.geometry`, or the recipe must name one.
+    The order is the smallest whose errors stay below half the targets on points of their own, with a
+    condition number up to 1e7. Raises InputError for a source without a device.
+    """
+    recipe = recipe or Recipe()
+    geometry = recipe.geometry or getattr(source, "geometry", None)
+    if geometry is None:
+        raise InputError(
+            "cannot tell which device this field belongs to: fit(source, recipe) with a recipe that names it"
+        )
+    region = geometry.region
+    seeds = np.random.SeedSequence(recipe.seed).spawn(len(_SAMPLES))
+    samples = {
+        name: _sample(source, region, np.random.default_rng(seed), *shape)
+        for (name, shape), seed in zip(_SAMPLES.items(), seeds, strict=True)
+    }
+    log.info("field: %d sample points", sum(a * b for a, b in _SAMPLES.values()))
+    tried = _climb(geometry, recipe, samples)
+    chosen = _choose(tried, recipe)
+    terms = chosen.candidate.with_parameters(chosen.solved.parameters)
+    jets = {name: terms.jet(data.points.reshape(-1, 3), 1) for name, data in samples.items()}
+    training, heldout = (_errors(jets[name], samples[name]) for name in ("training", "heldout"))
+    fem = {key: source.error[key] for key in ("B", "gradient")} if isinstance(source, Solution) else None
+    bound = {key: _SAFETY * heldout[key]["max"] + (fem[key] if fem else 0.0) for key in ("B", "gradient")}
+    log.info(
+        "fit: %s, %d parameters, held-out error %.1e in B, %.1e in the gradient",
+        chosen.candidate.label,
+        chosen.candidate.parameters,
+        heldout["B"]["max"],
+        heldout["gradient"]["max"],
+    )
+    return FieldModel(
+        name=geometry.name,
+        lowered=terms,
+        parameter=chosen.candidate.parameter,
+        covariance=chosen.solved.covariance,
+        region=region,
+        report={
+            **_headline(chosen),
+            "target": {"B": recipe.target_B, "gradient": recipe.target_gradient},
+            "training": training,
+            "heldout": heldout,
+            "fem": fem,
+            "bound": bound,
+            "worst": _worst(jets["heldout"], samples["heldout"], region),
+            "candidates": [{**_headline(one), "selection": one.selection} for one in tried],
+            "comparison": [_compare(candidate, samples, terms) for candidate in dissertation_families(geometry)],
+        },
+        provenance=_provenance(source, geometry),
+        unit=source.unit,
+    )
+
+
+def _sample(source: Field, region: Shell, rng: np.random.Generator, layers: int, per_layer: int) -> Samples:
+    points = region.layers(rng, layers, per_layer)
+    B, gradient = source.jet(points, 1)
+    return Samples(points, B, gradient)
+
+
+def _climb(geometry: Geometry, recipe: Recipe, samples: dict[str, Samples]) -> list[Fitted]:
+    """Fit the family's candidates, from few parameters to many, until one is good enough."""
+    family = recipe.family or family_of(geometry)
+    tried: list[Fitted] = []
+    for candidate in FAMILIES[family](geometry):
+        solved = _solve(candidate, samples["training"])
+        if solved.condition > CONDITION and tried:
+            break
+        terms = candidate.with_parameters(solved.parameters)
+        selection = _errors(terms.jet(samples["selection"].points.reshape(-1, 3), 1), samples["selection"])
+        tried.append(Fitted(candidate, solved, selection))
+        if _score(tried[-1], recipe) <= 0.5:
+            break
+    return tried
+
+
+def _choose(tried: list[Fitted], recipe: Recipe) -> Fitted:
+    """The first candidate below half the targets, else the best."""
+    chosen = min(tried, key=lambda one: _score(one, recipe))
+    if not np.isfinite(_score(chosen, recipe)):
+        raise ConvergenceError("no candidate could be fitted: the field data hold values that are not finite")
+    return chosen
+
+
+def _score(fitted: Fitted, recipe: Recipe) -> float:
+    """Largest error against its target."""
+    B, gradient = (float(fitted.selection[key]["max"]) for key in ("B", "gradient"))
+    return max(B / recipe.target_B, gradient / recipe.target_gradient)
+
+
+def _solve(candidate: Candidate, samples: Samples) -> LeastSquares:
+    """Least squares on B and gradient, each layer against its own root mean square, so that far points count."""
+    rows, targets = [], []
+    columns = candidate.columns(samples.points.reshape(-1, 3))
+    for column, data, weight in zip(columns, (samples.B, samples.gradient), (1.0, _GRADIENT_WEIGHT), strict=True):
+        per_point = tuple(range(2, data.ndim))
+        mean_square = np.mean(np.sum(data**2, axis=per_point), axis=1)
+        scale = weight / np.sqrt(mean_square).reshape(-1, *[1] * (data.ndim - 1))
+        rows.append((column.reshape(-1, *data.shape) * scale).reshape(candidate.parameters, -1))
+        targets.append((data * scale).ravel())
+    return solve_least_squares(np.concatenate(rows, axis=1).T, np.concatenate(targets))
+
+
+def _errors(jet: tuple[Floats, ...], samples: Samples, counted: Booleans | None = None) -> dict[str, Any]:
+    """Largest and root-mean-square relative errors over the `counted` (l, p) samples (default: all)."""
+    points = samples.points.shape[:2] if counted is None else samples.points[counted].shape[:1]
+    result: dict[str, Any] = {"points": int(np.prod(points))}
+    for key, found, truth in zip(("B", "gradient"), jet, (samples.B, samples.gradient), strict=True):
+        errors = relative_errors(found.reshape(truth.shape), truth)
+        errors = errors if counted is None else errors[counted]
+        result[key] = {"max": float(errors.max()), "rms": float(np.sqrt(np.mean(errors**2)))}
+    return result
+
+
+def _worst(jet: tuple[Floats, ...], samples: Samples, region: Shell) -> dict[str, Any]:
+    """Where the largest errors are: point and hull distance, m."""
+    worst: dict[str, Any] = {}
+    for key, found, truth in zip(("B", "gradient"), jet, (samples.B, samples.gradient), strict=True):
+        errors = relative_errors(found.reshape(truth.shape), truth)
+        point = samples.points[np.unravel_index(np.argmax(errors), errors.shape)]
+        distance = float(region.hull.distance(point))
+        worst[key] = {"point": point.tolist(), "distance": distance, "error": float(errors.max())}
+    return worst
+
+
+def _headline(fitted: Fitted) -> dict[str, Any]:
+    candidate = fitted.candidate
+    return {
+        "family": candidate.family,
+        "label": candidate.label,
+        "parameters": candidate.parameters,
+        "condition": fitted.solved.condition,
+    }
+
+
+def _compare(candidate: Candidate, samples: dict[str, Samples], ours: Terms) -> dict[str, Any]:
+    """A family of the dissertation, fitted to the same data its way: plain least squares on B (2.8).
+
+    Where the family is meant for a part of the region, it is fitted and judged in its window only, and our
+    model is judged there beside it.
+    """
+    training, heldout = samples["training"], samples["heldout"]
+    window = candidate.window or Everywhere()
+    seen = window.contains(training.points)
+    columns, _ = candidate.columns(training.points[seen])
+    solved = solve_least_squares(columns.reshape(candidate.parameters, -1).T, training.B[seen].ravel())
+    terms = candidate.with_parameters(solved.parameters)
+    counted = window.contains(heldout.points)
+    points = heldout.points.reshape(-1, 3)
+    theirs = _errors(terms.jet(points, 1), heldout, counted)
+    same = _errors(ours.jet(points, 1), heldout, counted)
+    return {
+        "family": candidate.family,
+        "label": candidate.label,
+        "source": candidate.source,
+        "window": candidate.window.describe() if candidate.window else "the whole region",
+        "parameters": candidate.parameters,
+        "condition": solved.condition,
+        "heldout": theirs,
+        "ours": same,
+        "terms": terms_to_list(terms),
+    }
+
+
+def _provenance(source: Field, geometry: Geometry) -> dict[str, Any]:
+    packages = ("numpy", "scipy", "numba", "gmsh", "scikit-fem", "pyamg")
+    solution = source if isinstance(source, Solution) else None
+    return {
+        "device": describe(geometry),
+        "source": "finite elements" if solution else type(source).__name__,
+        "solver": solution and solution.settings,
+        "solution": solution
+        and {"error": solution.error, "quantities": solution.quantities, "stats": solution.stats},
+        "versions": {
+            "python": platform.python_version(),
+            "magfem": _version("magfem"),
+            **{package: _version(package) for package in packages},
+        },
+        "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
+    }
+
+
+def _version(package: str) -> str:
+    try:
+        return importlib.metadata.version(package)
+    except importlib.metadata.PackageNotFoundError:
+        return "unknown"
