@@ -116,7 +116,7 @@ def _boundary(mesh: Mesh, sk_mesh: Any, basis: Any) -> OpenBoundary:
 
     facets, _ = _facet_numbers(mesh, sk_mesh, mesh.outer_facets)
     edge = skfem.FacetBasis(sk_mesh, basis.elem, facets=np.sort(facets), intorder=12)
-    shapes = np.array([edge.basis[a][0].value for a in range(edge.Nbfun)])
+    shapes = np.array([np.asarray(edge.basis[a][0]) for a in range(edge.Nbfun)])
     dofs = edge.element_dofs
     return half_circle(np.asarray(edge.global_coordinates()), np.asarray(edge.normals), shapes, edge.dx, dofs, basis.N)
 

@@ -39,8 +39,8 @@ def element_sizes(geometry: Geometry, dimension: int, resolution: float) -> Size
     if dimension == 3:
         return Sizes(
             rim=0.05 * feature / resolution,
-            surface=min(0.15 / resolution, 0.2) * feature,  # larger ones would misshape curved walls
-            outer=0.4 * radius / resolution,
+            surface=min(0.13 / resolution, 0.18) * feature,  # larger ones would misshape curved walls
+            outer=0.3 * radius / resolution,
         )
     return Sizes(
         rim=0.02 * feature / resolution,

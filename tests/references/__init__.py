@@ -1,0 +1,1 @@
+"""Independent references: other formulations, closed forms, published numbers with their source."""
