@@ -1,0 +1,86 @@
+"""What a report is about: from a card, a model or a recipe to a device, its solution, its model, measurements."""
+
+from __future__ import annotations
+
+import logging
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+from magfem.fem import Solution, solve
+from magfem.fitting import FieldModel, fit, load_model
+from magfem.geometry import Geometry, geometry_from_text, load_geometry
+from magfem.geometry.card import read_table
+from magfem.geometry.catalogue import is_path, names
+from magfem.report.recipe import Measurement, Recipe, load_recipe
+
+log = logging.getLogger("magfem")
+
+
+@dataclass(frozen=True, eq=False)
+class Subject:
+    """Everything that a report draws from.
+
+    usage: what a reader types to get the model: the name or path of a card or, if `is_model`, of the model.
+    solution: None for a model that was not fitted to one; `geometry` is None too when it names no device.
+    """
+
+    title: str
+    usage: str
+    model: FieldModel
+    is_model: bool = False
+    geometry: Geometry | None = None
+    solution: Solution | None = None
+    measurements: tuple[Measurement, ...] = ()
+
+
+def gather(target: str | os.PathLike[str]) -> Subject:
+    """Solve and fit, or load, what `target` names.
+
+    A name is a report recipe if there is one, else a model, else a card; a path is told apart by its ending and,
+    for TOML, by whether it names a device (a recipe) or its kind (a card). Raises InputError, CardError.
+    """
+    shown = os.fspath(target)
+    if is_path(target, ".toml") or is_path(target, ".json"):
+        if shown.endswith(".json"):
+            return _from_model(target)
+        table = read_table(Path(target), shown)
+        recipe = "device" in table and "kind" not in table
+        return _from_recipe(load_recipe(Path(target)), Path(target).parent) if recipe else _from_card(shown)
+    if shown in names("reports", ".toml"):
+        return _from_recipe(load_recipe(shown), None)
+    if shown in names("fits", ".json"):
+        return _from_model(target)
+    return _from_card(shown)
+
+
+def _from_recipe(recipe: Recipe, folder: Path | None) -> Subject:
+    """A recipe's device is a catalogue name, or a path seen from the recipe's folder."""
+    beside = folder is not None and is_path(recipe.device, ".toml")
+    device = os.fspath(folder / recipe.device) if folder is not None and beside else recipe.device
+    return _from_card(device, recipe)
+
+
+def _from_card(device: str, recipe: Recipe | None = None) -> Subject:
+    geometry = load_geometry(device)
+    solution = solve(geometry)
+    return Subject(
+        title=(recipe and recipe.title) or geometry.name,
+        usage=device,
+        model=fit(solution),
+        geometry=geometry,
+        solution=solution,
+        measurements=recipe.measurements if recipe else (),
+    )
+
+
+def _from_model(target: str | os.PathLike[str]) -> Subject:
+    """The model as it is; its device is solved again, with the settings it was fitted at, to hold it against."""
+    model = load_model(target)  # type: ignore[arg-type]
+    device, solver = model.provenance.get("device"), model.provenance.get("solver")
+    geometry = geometry_from_text(device["card"]["text"], device["card"]["path"]) if device else None
+    solution = None
+    if geometry is not None and solver:
+        log.info("report: solving the model's device again")
+        solution = solve(geometry, solver["dimension"], solver["resolution"])
+    return Subject(model.name, os.fspath(target), model, True, geometry, solution)
