@@ -71,6 +71,8 @@ def _explain(error: BaseException) -> int:
         message, code = f"error: {error}", error.exit_code
     elif isinstance(error, MemoryError):
         message, code = "error: out of memory: lower the resolution", 3
+    elif isinstance(error, ModuleNotFoundError):
+        message, code = f"error: the Python package {error.name} is missing: pip install {error.name}", 2
     elif isinstance(error, OSError):
         place = f" [{error.filename}]" if error.filename else ""
         message, code = f"error: {error.strerror or error}{place}", 3
