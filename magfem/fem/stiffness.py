@@ -101,7 +101,7 @@ def _straight(mesh: Mesh) -> Any:
     corners = mesh.points[mesh.cells[:, :4]]
     middle = 0.5 * (corners[:, [0, 1, 0, 0, 1, 2]] + corners[:, [1, 2, 2, 3, 3, 3]])
     bend = np.abs(mesh.points[mesh.cells[:, 4:]] - middle).max(axis=(1, 2))
-    return bend < 1e-10 * mesh.radius
+    return bend < 1e-14 * mesh.radius
 
 
 @kernel

@@ -5,12 +5,17 @@ from __future__ import annotations
 import os
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from magfem.errors import InputError
 from magfem.mesh.mesh import Mesh
 from magfem.typing import Floats
+
+_OPTIONS: dict[str, dict[str, Any]] = {
+    ".msh": {"file_format": "gmsh"},
+}
 
 
 def write_mesh(
@@ -38,9 +43,8 @@ def write_mesh(
     )
     if not path.parent.is_dir():
         raise InputError(f"cannot write: there is no folder {path.parent} [{path}]")
-    # Formats of several files (.xdmf with .h5) name each other, so the draft keeps the name, in its own folder.
+    # Formats of several files name each other, so the draft keeps the name, in a folder of its own.
     with tempfile.TemporaryDirectory(prefix=f".{path.name}.", dir=path.parent) as draft:
-        file_format = "gmsh" if path.suffix.lower() == ".msh" else None
-        content.write(Path(draft) / path.name, file_format=file_format)
+        content.write(Path(draft) / path.name, **_OPTIONS.get(path.suffix.lower(), {}))
         for piece in sorted(Path(draft).iterdir()):
             os.replace(piece, path.parent / piece.name)

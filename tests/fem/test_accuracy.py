@@ -123,7 +123,7 @@ def test_gauss_law_holds_through_the_magnet(rigid_ring_3d):
 def test_gradient_is_symmetric_trace_free_and_the_slope_of_B(name, request):
     solution = request.getfixturevalue(name)
     points = solution.geometry.region.layers(np.random.default_rng(8), 8, 6).reshape(-1, 3)
-    B, gradient, hessian = solution.jet(points, 2)
+    _, gradient, hessian = solution.jet(points, 2)
     size = np.linalg.norm(gradient, axis=(1, 2))
     assert np.all(np.abs(np.trace(gradient, axis1=1, axis2=2)) <= 1e-9 * size)
     assert np.all(np.linalg.norm(gradient - np.swapaxes(gradient, 1, 2), axis=(1, 2)) <= 2e-5 * size)

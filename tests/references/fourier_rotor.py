@@ -70,9 +70,9 @@ def _boundary(mesh, basis):
 
 def _bound_currents(mesh, basis, potential, magnetisation, susceptibility):
     edges, _ = mesh.body_facets(0)
-    powers = np.linalg.inv(np.vander(np.linspace(-1, 1, 5), increasing=True)) @ potential[
-        _along_edges(mesh, basis, edges)
-    ]
+    powers = (
+        np.linalg.inv(np.vander(np.linspace(-1, 1, 5), increasing=True)) @ potential[_along_edges(mesh, basis, edges)]
+    )
     t, w = np.polynomial.legendre.leggauss(8)
     f = np.polynomial.polynomial.polyval(t, powers)
     slope = np.polynomial.polynomial.polyval(t, powers[1:] * np.arange(1, 5)[:, None])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from scipy.integrate import quad
 from scipy.special import j1
@@ -25,6 +27,6 @@ def ring_field_energy(outer: float, inner: float, length: float, remanence: floa
     # Falls as k⁻³: piecewise over the oscillation, with the averaged tail added in closed form.
     end = 4000 / outer
     edges = np.linspace(1e-9 / outer, end, 2001)
-    total = sum(quad(integrand, a, b, epsrel=1e-10)[0] for a, b in zip(edges, edges[1:], strict=False))
+    total = sum(quad(integrand, a, b, epsrel=1e-10)[0] for a, b in pairwise(edges))
     tail = M**2 * (outer + inner) / np.pi / (2 * end**2)  # mean of (R J₁ − r J₁)² → (R + r)/(πk)
     return np.pi * MU_0 * (total + tail)
