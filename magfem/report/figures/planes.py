@@ -92,11 +92,12 @@ def field_map(field: Field, surfaces: tuple[Surface, ...], plane: Plane) -> Pict
     coarse, seeds = plane.points(_LINES)
     direction = field.B(seeds, outside="extrapolate")[..., list(plane.columns)]
     direction /= np.maximum(np.linalg.norm(direction, axis=-1, keepdims=True), 1e-300)
+    low, high = (float(q) for q in np.quantile(size, (0.002, 0.9995)))
     with drawing():
         drawn, axes, bar_axes = _square()
-        low, high = (float(q) for q in np.quantile(size, (0.002, 0.9995)))
-        norm = LogNorm(low, high)
-        image = axes.pcolormesh(side * MILLI, side * MILLI, size, norm=norm, cmap=MAGNITUDE, rasterized=True)
+        image = axes.pcolormesh(
+            side * MILLI, side * MILLI, size, norm=LogNorm(low, high), cmap=MAGNITUDE, rasterized=True
+        )
         axes.streamplot(
             coarse * MILLI,
             coarse * MILLI,
