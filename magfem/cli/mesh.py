@@ -7,7 +7,6 @@ from argparse import Namespace
 from magfem.cli.console import show_result
 from magfem.cli.outputs import output_file
 from magfem.cli.parser import CommandLine, add_dimension, add_resolution
-from magfem.errors import InputError
 
 ENDINGS = (".msh", ".vtu", ".vtk", ".xdmf")
 """Formats that hold curved elements and the body each belongs to."""
@@ -37,20 +36,14 @@ def add(commands: CommandLine) -> None:
 def run(options: Namespace) -> int:
     """Mesh and write."""
     path = output_file(options.output, ENDINGS)
-    from magfem.fem.solve import RESOLUTIONS
+    from magfem.fem.solve import check_resolution, choose_dimension
     from magfem.geometry import load_geometry
     from magfem.mesh.export import write_mesh
     from magfem.mesh.generate import generate
 
     geometry = load_geometry(options.card)
-    dimension = options.dimension
-    if dimension == 2 and not geometry.axisymmetric:
-        raise InputError("only bodies of revolution with axial magnetisation have a half section: use dimension 3")
-    low, high = RESOLUTIONS[dimension]
-    if not low <= options.resolution <= high:
-        raise InputError(
-            f"resolution must lie between {low:g} and {high:g} in dimension {dimension}, got {options.resolution:g}"
-        )
+    dimension = choose_dimension(geometry, options.dimension)
+    check_resolution(options.resolution, dimension)
     mesh = generate(geometry, dimension, options.resolution)
     write_mesh(mesh, path)
     cells, nodes = len(mesh.cells), len(mesh.points)

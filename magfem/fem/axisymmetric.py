@@ -92,7 +92,7 @@ def scikit_mesh(mesh: Mesh) -> Any:
     ends = np.sort(numbered.reshape(-1, 3)[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     middle = np.empty(linear.nfacets, dtype=np.int64)
     middle[_find_facets(linear, ends)] = mesh.cells[:, 3:].ravel()
-    return skfem.MeshTri2(np.hstack([linear.p, mesh.points[middle].T]), triangles)
+    return skfem.MeshTri2(np.ascontiguousarray(np.hstack([linear.p, mesh.points[middle].T])), triangles)
 
 
 def _find_facets(sk_mesh: Any, ends: Integers) -> Integers:

@@ -47,8 +47,8 @@ def solve(
     The stated error compares with a second solution on elements twice as large, over random points of the
     device's region. Raises InputError for what cannot be solved, MeshError and ConvergenceError.
     """
-    dimension = _dimension(geometry, dimension)
-    _check_resolution(resolution, dimension)
+    dimension = choose_dimension(geometry, dimension)
+    check_resolution(resolution, dimension)
     if tolerance is not None and not 0 < tolerance < 1:
         raise InputError(f"tolerance must be a relative error between 0 and 1, got {tolerance}")
     started = time.perf_counter()
@@ -88,7 +88,8 @@ def solve(
     )
 
 
-def _dimension(geometry: Geometry, dimension: int | None) -> int:
+def choose_dimension(geometry: Geometry, dimension: int | None) -> int:
+    """The dimension that `solve` takes; InputError for one that the device cannot be solved in."""
     if dimension is None:
         return 2 if geometry.axisymmetric else 3
     if dimension not in (2, 3):
@@ -98,7 +99,8 @@ def _dimension(geometry: Geometry, dimension: int | None) -> int:
     return dimension
 
 
-def _check_resolution(resolution: float, dimension: int) -> None:
+def check_resolution(resolution: float, dimension: int) -> None:
+    """Raise InputError unless `resolution` lies in RESOLUTIONS."""
     low, high = RESOLUTIONS[dimension]
     if not low <= resolution <= high:
         raise InputError(

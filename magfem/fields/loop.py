@@ -24,24 +24,35 @@ from __future__ import annotations
 
 from math import pi, sqrt
 
+import numpy as np
+
 from magfem.compiled import kernel
 from magfem.constants import MU_0
 from magfem.typing import Floats
 
-_SERIES_BELOW = 0.12  # β²/α²; the series then needs at most 20 terms, the differences lose at most 3 digits
+_SERIES_BELOW, _HESSIAN_SERIES_BELOW = 0.04, 0.12
+"""Values of β²/α² below which the series are used: 12 terms reach rounding at the first, 22 at the second.
+At these limits differences of K and E lose three digits for T(2, 7/2), and five for T(3, 11/2)."""
+
+
+def _series_coefficients(j: int, p: float, terms: int = 22) -> Floats:
+    """Coefficients (terms,) of T(j, p) α^p = ∫ sin^{2j}ψ dψ · ₂F₁(p/2, (p+1)/2; j+1; β²/α²)."""
+    n = np.arange(terms - 1)
+    ratios = (p / 2 + n) * ((p + 1) / 2 + n) / ((j + 1 + n) * (1 + n))
+    mean = np.prod((2 * np.arange(1, j + 1) - 1) / (2 * np.arange(1, j + 1)))
+    return 2 * pi * mean * np.concatenate([[1.0], np.cumprod(ratios)])
+
+
+_T1_32, _T1_52 = _series_coefficients(1, 1.5), _series_coefficients(1, 2.5)
+_T2_72, _T3_112 = _series_coefficients(2, 3.5), _series_coefficients(3, 5.5)
 
 
 @kernel
-def _series(p: float, j: int, leading: float, alpha: float, ratio: float) -> float:
-    """T(j, p) = leading·α^{−p} ₂F₁(p/2, (p+1)/2; j+1; β²/α²), for small β²/α²; leading = T(j, p) at β = 0, α = 1."""
-    a, b, c = p / 2, (p + 1) / 2, j + 1.0
-    term: float = leading * alpha**-p
-    total = term
-    for n in range(60):
-        term *= (a + n) * (b + n) / ((c + n) * (1.0 + n)) * ratio
-        total += term
-        if term < 1e-17 * total:
-            break
+def _series(coefficients: Floats, terms: int, ratio: float) -> float:
+    """Sum of the first `terms` powers of `ratio`, by Horner's rule."""
+    total = 0.0
+    for n in range(terms - 1, -1, -1):
+        total = total * ratio + coefficients[n]
     return total
 
 
@@ -63,13 +74,20 @@ def add_loop(x: float, y: float, z: float, radius: float, current: float, order:
     product = far * near
     ratio = beta2 / (alpha * alpha)
     t2_72 = t3_112 = 0.0
-    if ratio < _SERIES_BELOW:
-        t1_32 = _series(1.5, 1, pi, alpha, ratio)
-        t1_52 = _series(2.5, 1, pi, alpha, ratio)
+    near_axis = ratio < (_SERIES_BELOW if order < 2 else _HESSIAN_SERIES_BELOW)
+    if near_axis:
+        terms = 12 if ratio < _SERIES_BELOW else 22
+        inverse = 1.0 / alpha
+        power = inverse * sqrt(inverse)
+        t1_32 = power * _series(_T1_32, terms, ratio)
+        power *= inverse
+        t1_52 = power * _series(_T1_52, terms, ratio)
         if order > 0:
-            t2_72 = _series(3.5, 2, 0.75 * pi, alpha, ratio)
+            power *= inverse
+            t2_72 = power * _series(_T2_72, terms, ratio)
         if order > 1:
-            t3_112 = _series(5.5, 3, 0.625 * pi, alpha, ratio)
+            power *= inverse * inverse
+            t3_112 = power * _series(_T3_112, terms, ratio)
     else:
         # Complete elliptic integrals K and E of modulus √(2β/(α+β)) by the arithmetic–geometric mean.
         g = sqrt(near / far)
@@ -108,7 +126,7 @@ def add_loop(x: float, y: float, z: float, radius: float, current: float, order:
     out[7] += 2.0 * y * F_s
     if order < 2:
         return
-    if ratio >= _SERIES_BELOW:
+    if not near_axis:
         t3_112 = (alpha * t2_92 - t2_72) / (0.9 * beta2)
     t1_92 = (4.0 * alpha * t1_72 - 0.5 * t1_52) / (3.5 * product)
     t2_112 = (4.0 * alpha * t2_92 + 0.5 * t2_72) / (4.5 * product)

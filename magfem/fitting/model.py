@@ -107,7 +107,13 @@ def load_model(name_or_path: str | Path) -> FieldModel:
         key = "unit"
         if data["unit"] not in ("T", "T/A"):
             raise ValueError('"T" or "T/A"')
-    except (KeyError, TypeError, ValueError, IndexError, InputError) as error:
+        key = "report"
+        if not all(float(data["report"]["bound"][name]) > 0 for name in ("B", "gradient")):
+            raise ValueError("positive bounds of B and gradient")
+        key = "provenance"
+        if not isinstance(data["provenance"]["device"], dict):
+            raise ValueError("a device")
+    except (AttributeError, IndexError, InputError, KeyError, TypeError, ValueError) as error:
         reason = f"missing key {error}" if isinstance(error, KeyError) else f"expected {error}"
         raise CardError(f"not a whole field model: {reason}", f"{shown}: {key}") from None
     return FieldModel(
