@@ -40,7 +40,8 @@ def _series_coefficients(j: int, p: float, terms: int = 22) -> Floats:
     n = np.arange(terms - 1)
     ratios = (p / 2 + n) * ((p + 1) / 2 + n) / ((j + 1 + n) * (1 + n))
     mean = np.prod((2 * np.arange(1, j + 1) - 1) / (2 * np.arange(1, j + 1)))
-    return 2 * pi * mean * np.concatenate([[1.0], np.cumprod(ratios)])
+    coefficients: Floats = 2 * pi * mean * np.concatenate([[1.0], np.cumprod(ratios)])
+    return coefficients
 
 
 _T1_32, _T1_52 = _series_coefficients(1, 1.5), _series_coefficients(1, 2.5)

@@ -226,8 +226,7 @@ def _provenance(source: Field, geometry: Geometry) -> dict[str, Any]:
         "device": describe(geometry),
         "source": "finite elements" if solution else type(source).__name__,
         "solver": solution and solution.settings,
-        "solution": solution
-        and {"error": solution.error, "quantities": solution.quantities, "stats": solution.stats},
+        "solution": solution and {"error": solution.error, "quantities": solution.quantities, "stats": solution.stats},
         "versions": {
             "python": platform.python_version(),
             "magfem": _version("magfem"),

@@ -55,9 +55,7 @@ def resolve(section: str, name_or_path: str | os.PathLike[str], suffix: str) -> 
     nearest = get_close_matches(name, known, n=1, cutoff=0.0)
     advice = f"; the nearest is {quoted(nearest[0])}" if nearest else ""
     noun = _NOUNS.get((section, suffix), "file")
-    raise InputError(
-        f"unknown {noun} {quoted(name)}{advice} (`magfem list` shows all, a path ends in {suffix})"
-    )
+    raise InputError(f"unknown {noun} {quoted(name)}{advice} (`magfem list` shows all, a path ends in {suffix})")
 
 
 def short_path(section: str, name_or_path: str | os.PathLike[str], suffix: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 from magfem.geometry.magnet_of_revolution import MagnetOfRevolution
 from magfem.geometry.tube import Tube
@@ -13,7 +14,7 @@ class CylinderMagnet(MagnetOfRevolution):
     """A full cylinder: axis along z, centre at the origin. Raises InputError when it is impossible."""
 
     kind = "cylinder_magnet"
-    dimensions = ("diameter", "length")
+    dimensions: ClassVar[tuple[str, ...]] = ("diameter", "length")
 
     diameter: float  # m
     length: float  # m, along z

@@ -37,9 +37,7 @@ def check_positive_length(subject: str, key: str, value: float) -> None:
     """Raise InvalidValue unless `value` is a finite length above zero, m."""
     check_number(subject, key, value)
     if value <= 0:
-        raise InvalidValue(
-            f"{subject}: {name_of(key)} must be positive, got {format_quantity(value, 'length')}", key
-        )
+        raise InvalidValue(f"{subject}: {name_of(key)} must be positive, got {format_quantity(value, 'length')}", key)
 
 
 def check_length(subject: str, key: str, value: float) -> None:

@@ -50,9 +50,7 @@ class MagnetOfRevolution(ABC):
 
     def __post_init__(self) -> None:
         if not isinstance(self.material, PermanentMagnet):
-            raise InputError(
-                f"{self.words}: material must be a PermanentMagnet, got {describe(self.material)}"
-            )
+            raise InputError(f"{self.words}: material must be a PermanentMagnet, got {describe(self.material)}")
         for key in ("name", "source"):
             if not isinstance(getattr(self, key), str):
                 raise InputError(f"{self.words}: {key} must be a text, got {describe(getattr(self, key))}")
@@ -134,9 +132,7 @@ class MagnetOfRevolution(ABC):
         """
         tube = self.tube
         clearance = _two_digits(tube.outer_diameter / 8) if self.clearance is None else self.clearance
-        extent = (
-            _two_digits(1.5 * max(tube.outer_diameter, tube.length)) if self.extent is None else self.extent
-        )
+        extent = _two_digits(1.5 * max(tube.outer_diameter, tube.length)) if self.extent is None else self.extent
         return Shell(self.hull, clearance, extent)
 
     @property
@@ -161,8 +157,7 @@ class MagnetOfRevolution(ABC):
         shown_near, shown_far, size = (format_quantity(value, "length") for value in (near, far, largest))
         if near >= far and self.clearance is None:
             raise InvalidValue(
-                f"{self.words}: extent must be larger than the default clearance ({shown_near}), "
-                f"got {shown_far}",
+                f"{self.words}: extent must be larger than the default clearance ({shown_near}), got {shown_far}",
                 "region.extent",
             )
         if near >= far:

@@ -96,8 +96,7 @@ def _unit_vector(value: object) -> Direction:
     if not isinstance(value, list | tuple | np.ndarray) or len(value) != 3:
         count = f" of {len(value)}" if isinstance(value, list | tuple) else ""
         raise InvalidValue(
-            f"{_SUBJECT}: magnetisation must be three numbers such as [0, 1, 1], "
-            f"got {describe(value)}{count}",
+            f"{_SUBJECT}: magnetisation must be three numbers such as [0, 1, 1], got {describe(value)}{count}",
             key,
         )
     for component in value:

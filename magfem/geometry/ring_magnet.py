@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 from magfem.geometry.limits import InvalidValue, check_thickness
 from magfem.geometry.magnet_of_revolution import MagnetOfRevolution
@@ -15,7 +16,7 @@ class RingMagnet(MagnetOfRevolution):
     """A ring: axis along z, centre at the origin. Raises InputError when the ring is impossible."""
 
     kind = "ring_magnet"
-    dimensions = ("outer_diameter", "inner_diameter", "length")
+    dimensions: ClassVar[tuple[str, ...]] = ("outer_diameter", "inner_diameter", "length")
 
     outer_diameter: float  # m
     inner_diameter: float  # m, > 0; a full cylinder is a CylinderMagnet

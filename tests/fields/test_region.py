@@ -65,9 +65,7 @@ def test_offset_points_lie_at_their_distance(hull: CylinderHull) -> None:
     distances = np.array([1e-6, 0.5e-3, 2e-3, 50e-3])
     points = hull.offset_points(distances, 500, np.random.default_rng(2))
     assert points.shape == (4, 500, 3)
-    np.testing.assert_allclose(
-        hull.distance(points), np.broadcast_to(distances[:, None], (4, 500)), rtol=1e-9
-    )
+    np.testing.assert_allclose(hull.distance(points), np.broadcast_to(distances[:, None], (4, 500)), rtol=1e-9)
 
 
 @pytest.mark.parametrize("hull", [DISC, PIN])

@@ -100,9 +100,7 @@ def test_axis_matches_elementary_formula(aspect):
     # The formulas, differences themselves, hold their last digits only in extended precision.
     tolerance = 1e-13 + 10 * np.finfo(np.longdouble).eps * M * mu_0 / np.abs(truth)
     assert np.all(np.abs(b[:, 2] / truth - 1) < tolerance)
-    np.testing.assert_allclose(
-        gradient[:, 2, 2], slope.astype(float), rtol=1e-9, atol=1e-16 * M * mu_0 / RADIUS
-    )
+    np.testing.assert_allclose(gradient[:, 2, 2], slope.astype(float), rtol=1e-9, atol=1e-16 * M * mu_0 / RADIUS)
     assert np.all(b[:, :2] == 0)
 
 
@@ -117,8 +115,7 @@ def test_derivatives_match_central_differences(direction, order):
     def difference(step: float) -> Floats:
         shifts = step * np.eye(3)[:, None]
         ahead, behind = (
-            cylinder_jet(points + sign * shifts, RADIUS, 1.2 * RADIUS, m, order - 1)[order - 1]
-            for sign in (1, -1)
+            cylinder_jet(points + sign * shifts, RADIUS, 1.2 * RADIUS, m, order - 1)[order - 1] for sign in (1, -1)
         )
         return np.moveaxis((ahead - behind) / (2 * step), 0, -1)
 
@@ -205,8 +202,7 @@ def test_normal_B_and_tangential_H_are_continuous(direction):
     outward = from_cylindrical(np.ones(count), phi, np.zeros(count))
     for points, normal in ((wall, outward), (face, np.tile([0.0, 0, 1], (count, 1)))):
         inner, outer = (
-            cylinder_jet(points + side * step * RADIUS * normal, RADIUS, length, m, order=0)[0]
-            for side in (-1, 1)
+            cylinder_jet(points + side * step * RADIUS * normal, RADIUS, length, m, order=0)[0] for side in (-1, 1)
         )
         jump = (outer - inner) / mu_0
         # B_n does not jump, H_t neither: B jumps by the tangential part of the magnetisation that ends.
@@ -216,9 +212,7 @@ def test_normal_B_and_tangential_H_are_continuous(direction):
 
 def test_surface_belongs_to_the_magnet():
     m, length = M * np.array(DIRECTIONS["skew"]), RADIUS
-    surface = np.array(
-        [[RADIUS, 0, 0], [0, -RADIUS, 0.2 * length], [0.3e-3, 0, length / 2], [0, 0, -length / 2]]
-    )
+    surface = np.array([[RADIUS, 0, 0], [0, -RADIUS, 0.2 * length], [0.3e-3, 0, length / 2], [0, 0, -length / 2]])
     for on, within in zip(
         cylinder_jet(surface, RADIUS, length, m, order=2),
         cylinder_jet(surface * (1 - 1e-12), RADIUS, length, m, order=2),
@@ -239,9 +233,7 @@ def test_plane_of_a_face_beside_the_magnet_is_ordinary():
 
 
 @aspects
-@pytest.mark.parametrize(
-    ("switch", "values"), [("NEAR_AXIS", (0.003, 0.03)), ("FAR", (1.8, 2.5))], ids=["axis", "far"]
-)
+@pytest.mark.parametrize(("switch", "values"), [("NEAR_AXIS", (0.003, 0.03)), ("FAR", (1.8, 2.5))], ids=["axis", "far"])
 def test_both_routes_agree_where_they_meet(aspect, switch, values, monkeypatch):
     rng = np.random.default_rng(7)
     half, count = aspect / 2, 200

@@ -15,9 +15,7 @@ from magfem.geometry import CylinderMagnet, Geometry, PermanentMagnet, RingMagne
 POSSIBLE_MM = st.floats(0.1, 50).map(lambda value: f'"{value!r} mm"')
 ANY_NUMBER = st.floats(allow_nan=True, allow_infinity=True)
 SCALAR = st.one_of(
-    st.tuples(ANY_NUMBER, st.sampled_from(["mm", "m", "T", "kg", "", "Mm"])).map(
-        lambda t: f'"{t[0]!r} {t[1]}"'
-    ),
+    st.tuples(ANY_NUMBER, st.sampled_from(["mm", "m", "T", "kg", "", "Mm"])).map(lambda t: f'"{t[0]!r} {t[1]}"'),
     ANY_NUMBER.map(repr),
     st.integers().map(str),
     st.sampled_from(["true", '""', "[]", "{}", '"axial"', "1979-05-27", "07:32:00", '"4 mm\\n\\u2028"']),
@@ -98,17 +96,13 @@ def test_sensible_magnets_are_born(outer: float, bore: float, slenderness: float
     assert_sound(CylinderMagnet(diameter=outer, length=length, material=material))
     if inner < 0.995 * outer:
         assert_sound(
-            RingMagnet(
-                outer_diameter=outer, inner_diameter=inner, length=min(length, outer), material=material
-            )
+            RingMagnet(outer_diameter=outer, inner_diameter=inner, length=min(length, outer), material=material)
         )
 
 
 @given(sizes=st.tuples(ANY_NUMBER, ANY_NUMBER, ANY_NUMBER), around=st.tuples(ANY_NUMBER, ANY_NUMBER))
 @settings(max_examples=200, derandomize=True, deadline=None)
-def test_any_floats_are_a_ring_or_one_sentence(
-    sizes: tuple[float, float, float], around: tuple[float, float]
-) -> None:
+def test_any_floats_are_a_ring_or_one_sentence(sizes: tuple[float, float, float], around: tuple[float, float]) -> None:
     try:
         ring = RingMagnet(
             outer_diameter=sizes[0],

@@ -106,9 +106,7 @@ def test_optional_keys_have_their_documented_defaults(tmp_path: Path) -> None:
         ("[1e308, 1e308, 0]", (0.5**0.5, 0.5**0.5, 0)),
     ],
 )
-def test_magnetisation_becomes_a_unit_vector(
-    tmp_path: Path, written: str, unit_vector: tuple[float, ...]
-) -> None:
+def test_magnetisation_becomes_a_unit_vector(tmp_path: Path, written: str, unit_vector: tuple[float, ...]) -> None:
     ring = load_geometry(write(tmp_path, RING.replace('"axial"', written)))
     magnetisation = ring.bodies[0].material.magnetisation
     np.testing.assert_allclose(magnetisation, unit_vector, rtol=1e-15, atol=0)

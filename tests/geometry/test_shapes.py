@@ -79,9 +79,7 @@ def test_feature_size_is_the_thinnest_part() -> None:
     ("direction", "axisymmetric"),
     [(AXIAL, True), ((0, 0, -3), True), (DIAMETRIC, False), ((0, 1, 1), False), ((1e-6, 0, 1), False)],
 )
-def test_only_axial_magnets_are_axisymmetric(
-    direction: tuple[float, float, float], axisymmetric: bool
-) -> None:
+def test_only_axial_magnets_are_axisymmetric(direction: tuple[float, float, float], axisymmetric: bool) -> None:
     material = PermanentMagnet(1.35, magnetisation=direction)
     assert replace(RING, material=material).axisymmetric is axisymmetric
 

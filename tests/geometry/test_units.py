@@ -127,9 +127,7 @@ def test_reading_undoes_writing(value: float, dimension: str) -> None:
 
 
 _WORDS = st.lists(
-    st.sampled_from(
-        ["4", "1e5", "-", " ", "mm", "m", "°", "°C", "µ", "²", "^", "**", "/", "*", "·", "e", "dB"]
-    ),
+    st.sampled_from(["4", "1e5", "-", " ", "mm", "m", "°", "°C", "µ", "²", "^", "**", "/", "*", "·", "e", "dB"]),
     max_size=6,
 ).map("".join)
 
