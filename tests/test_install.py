@@ -121,9 +121,7 @@ def test_the_catalogue_travels(programs: Path, tmp_path: Path) -> None:
 
 
 def test_the_sdist_makes_the_same_wheel(wheel: Path, tmp_path: Path) -> None:
-    run(
-        sys.executable, "-m", "hatchling", "build", "--target", "sdist", "--directory", tmp_path, cwd=CHECKOUT
-    )
+    run(sys.executable, "-m", "hatchling", "build", "--target", "sdist", "--directory", tmp_path, cwd=CHECKOUT)
     (sdist,) = tmp_path.glob("*.tar.gz")
     (tmp_path / "wheel").mkdir()
     again = build_wheel(sdist, tmp_path / "wheel")
