@@ -72,7 +72,7 @@ class Evaluated(ABC):
         jet = []
         for part in parts[: order + 1]:
             if not promised.all():
-                part[~promised] = np.nan
+                part = np.where(promised.reshape(-1, *[1] * (part.ndim - 1)), part, np.nan)
             jet.append(part.reshape(lead + part.shape[1:]))
         return tuple(jet)
 
@@ -100,11 +100,19 @@ class Evaluated(ABC):
     def __neg__(self) -> Scaled:
         return Scaled(self, -1.0, self.unit)
 
+    # Below, the other operand may be any Field, Evaluated or not; what is no field at all is a TypeError.
+
     def __add__(self, other: Field) -> Summed:
-        return Summed((self, other))
+        return Summed((self, other)) if isinstance(other, Field) else NotImplemented
+
+    def __radd__(self, other: Field) -> Summed:
+        return Summed((other, self)) if isinstance(other, Field) else NotImplemented
 
     def __sub__(self, other: Field) -> Summed:
-        return Summed((self, Scaled(other, -1.0, other.unit)))
+        return Summed((self, Scaled(other, -1.0, other.unit))) if isinstance(other, Field) else NotImplemented
+
+    def __rsub__(self, other: Field) -> Summed:
+        return Summed((other, -self)) if isinstance(other, Field) else NotImplemented
 
 
 @dataclass(frozen=True)
@@ -175,6 +183,8 @@ class Summed(Evaluated):
     fields: tuple[Field, ...]
 
     def __post_init__(self) -> None:
+        if not self.fields:
+            raise InputError("a sum of fields needs at least one field")
         units = [field.unit for field in self.fields]
         if len(set(units)) > 1:
             raise UnitMismatchError(
@@ -201,9 +211,12 @@ class Summed(Evaluated):
 def as_points(points: ArrayLike) -> Points:
     """`points` as a float array (..., 3) m; InputError says what is wrong with them."""
     try:
-        array = np.asarray(points, dtype=float)
-    except (TypeError, ValueError):
-        raise InputError("points must be numbers, shape (..., 3), in m") from None
+        given = np.asarray(points)
+    except (TypeError, ValueError):  # ragged
+        given = np.asarray(None)
+    if given.dtype.kind not in "fiub":
+        raise InputError("points must be real numbers, shape (..., 3), in m")
+    array = given.astype(float, copy=False)
     if array.ndim == 0 or array.shape[-1] != 3:
         raise InputError(f"points must have shape (..., 3), got {array.shape}")
     if not np.isfinite(array).all():

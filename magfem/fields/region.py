@@ -10,13 +10,13 @@ from scipy.spatial.transform import RigidTransform
 
 from magfem.errors import InputError
 from magfem.fields.hull import Hull, hull_from_dict, hull_to_dict
-from magfem.typing import Booleans, Points
+from magfem.typing import ArrayLike, Booleans, Points
 
 
 class Region(Protocol):
     """A part of space."""
 
-    def contains(self, points: Points) -> Booleans:
+    def contains(self, points: ArrayLike) -> Booleans:
         """True (...) where `points` (..., 3) m lie in the region."""
         ...
 
@@ -29,8 +29,9 @@ class Region(Protocol):
 class Everywhere:
     """All of space: closed forms and solutions hold up to rounding and their stated error."""
 
-    def contains(self, points: Points) -> Booleans:
-        return np.ones(points.shape[:-1], dtype=bool)
+    def contains(self, points: ArrayLike) -> Booleans:
+        inside: Booleans = np.isfinite(np.asarray(points, dtype=float)).all(axis=-1)
+        return inside
 
     def describe(self) -> str:
         return "everywhere"
@@ -44,8 +45,8 @@ class Shell:
     clearance: float  # m
     extent: float  # m
 
-    def contains(self, points: Points) -> Booleans:
-        distance = self.hull.distance(points)
+    def contains(self, points: ArrayLike) -> Booleans:
+        distance = self.hull.distance(np.asarray(points, dtype=float))
         slack = 1e-12 * self.extent  # points made to lie on the limit are inside
         inside: Booleans = (distance >= self.clearance - slack) & (distance <= self.extent + slack)
         return inside
@@ -81,8 +82,9 @@ class PlacedRegion:
     region: Region
     pose: RigidTransform
 
-    def contains(self, points: Points) -> Booleans:
-        local = self.pose.inv().apply(points.reshape(-1, 3)).reshape(points.shape)
+    def contains(self, points: ArrayLike) -> Booleans:
+        array = np.asarray(points, dtype=float)
+        local = self.pose.inv().apply(array.reshape(-1, 3)).reshape(array.shape)
         return self.region.contains(local)
 
     def describe(self) -> str:
@@ -96,7 +98,7 @@ class Intersection:
 
     regions: tuple[Region, ...]
 
-    def contains(self, points: Points) -> Booleans:
+    def contains(self, points: ArrayLike) -> Booleans:
         inside: Booleans = np.logical_and.reduce([region.contains(points) for region in self.regions])
         return inside
 

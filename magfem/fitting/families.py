@@ -12,7 +12,7 @@ from magfem.fields.hull import CylinderHull
 from magfem.fields.region import Region
 from magfem.fields.terms import Terms, concatenate, frame_about, harmonics, loops
 from magfem.geometry import Geometry
-from magfem.typing import Booleans, Floats, Integers, Points
+from magfem.typing import ArrayLike, Booleans, Floats, Integers
 
 
 @dataclass(frozen=True)
@@ -49,8 +49,8 @@ class InFront:
 
     height: float
 
-    def contains(self, points: Points) -> Booleans:
-        inside: Booleans = points[..., 2] >= self.height
+    def contains(self, points: ArrayLike) -> Booleans:
+        inside: Booleans = np.asarray(points, dtype=float)[..., 2] >= self.height
         return inside
 
     def describe(self) -> str:
