@@ -29,11 +29,20 @@ def kernel(function: Function) -> Function:
     The kernel releases the interpreter lock, so that threads can share its work, and divides by zero as IEEE
     arithmetic does (infinite fields on wires) instead of raising.
     """
+    return _compile(function, fastmath=False)
+
+
+def summing_kernel(function: Function) -> Function:
+    """A kernel whose sums may be taken in any order, so that they use the processor's vector units."""
+    return _compile(function, fastmath={"reassoc", "contract", "nsz", "arcp"})
+
+
+def _compile(function: Function, fastmath: Any) -> Function:
     folder = _cache_folder()
     config: Any = numba.config
     previous, config.CACHE_DIR = config.CACHE_DIR, str(folder)
     try:
-        compiled: Any = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
+        compiled: Any = numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=fastmath)(function)
     finally:
         config.CACHE_DIR = previous
     return cast(Function, compiled)
@@ -63,7 +72,7 @@ def _cache_folder() -> Path:
     digest = hashlib.sha256(numba.__version__.encode())
     for source in sorted(package.rglob("*.py")):
         text = source.read_bytes()
-        if b"import kernel" in text:
+        if b"magfem.compiled import" in text:
             digest.update(text)
     base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     for parent in (Path(base), Path(tempfile.gettempdir())):

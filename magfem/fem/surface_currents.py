@@ -17,7 +17,7 @@ from functools import cache
 
 import numpy as np
 
-from magfem.compiled import kernel
+from magfem.compiled import kernel, summing_kernel
 from magfem.constants import MU_0
 from magfem.fem.open_boundary import triangle_shapes
 from magfem.threads import in_chunks
@@ -51,7 +51,9 @@ class SurfaceCurrents:
         centre = self.nodes[:, :3].mean(axis=1)
         size = np.linalg.norm(self.nodes[:, :3] - centre[:, None], axis=-1).max(axis=1)
         far, near = _rule(2), _rule(6)
-        places, strengths = zip(*(self._elements(rule[0], rule[1]) for rule in (far, near)), strict=True)
+        places, strengths = self._elements(*near)
+        # One row for each coordinate, points of the rule before triangles: the layout that vector units like.
+        distant = np.concatenate([array.transpose(2, 1, 0) for array in self._elements(*far)]).copy()
         barycentric = np.column_stack([1 - near[0].sum(axis=1), near[0]])
 
         def run(chunk: slice) -> None:
@@ -63,10 +65,9 @@ class SurfaceCurrents:
                 self.susceptibility,
                 centre,
                 size,
-                places[0],
-                strengths[0],
-                places[1],
-                strengths[1],
+                distant,
+                places,
+                strengths,
                 barycentric,
                 near[1],
                 order,
@@ -154,6 +155,78 @@ def _add_element(
                 hessian[i, j, k] += value
 
 
+@summing_kernel
+def _add_distant(
+    x: float,
+    y: float,
+    z: float,
+    distant: Floats,
+    share: Floats,
+    order: int,
+    B: Floats,
+    gradient: Floats,
+    hessian: Floats,
+) -> None:
+    """Add all elements `distant` (6, q, t), places then strengths, of triangles whose `share` (t,) is one.
+
+    The same sums as `_add_element`, written for vector units; the hessian, rarely wanted, is not.
+    """
+    if order > 1:
+        for q in range(distant.shape[1]):
+            for t in range(distant.shape[2]):
+                if share[t] == 1.0:
+                    e = distant[:, q, t]
+                    _add_element(x - e[0], y - e[1], z - e[2], e[3], e[4], e[5], order, B, gradient, hessian)
+        return
+    bx = by = bz = 0.0
+    gxx = gxy = gxz = gyx = gyy = gyz = gzx = gzy = gzz = 0.0
+    for q in range(distant.shape[1]):
+        px, py, pz = distant[0, q], distant[1, q], distant[2, q]
+        sx, sy, sz = distant[3, q], distant[4, q], distant[5, q]
+        if order == 0:
+            for t in range(distant.shape[2]):
+                rx, ry, rz = x - px[t], y - py[t], z - pz[t]
+                r2 = max(rx * rx + ry * ry + rz * rz, 1e-60)
+                i3 = share[t] / (r2 * np.sqrt(r2))
+                bx += (sy[t] * rz - sz[t] * ry) * i3
+                by += (sz[t] * rx - sx[t] * rz) * i3
+                bz += (sx[t] * ry - sy[t] * rx) * i3
+        else:
+            for t in range(distant.shape[2]):
+                rx, ry, rz = x - px[t], y - py[t], z - pz[t]
+                r2 = max(rx * rx + ry * ry + rz * rz, 1e-60)
+                inverse = 1.0 / r2
+                i3 = share[t] * inverse * np.sqrt(inverse)
+                kx, ky, kz = sx[t] * i3, sy[t] * i3, sz[t] * i3
+                cx, cy, cz = ky * rz - kz * ry, kz * rx - kx * rz, kx * ry - ky * rx
+                bx += cx
+                by += cy
+                bz += cz
+                ux, uy, uz = -3.0 * inverse * rx, -3.0 * inverse * ry, -3.0 * inverse * rz
+                gxx += cx * ux
+                gxy += cx * uy - kz
+                gxz += cx * uz + ky
+                gyx += cy * ux + kz
+                gyy += cy * uy
+                gyz += cy * uz - kx
+                gzx += cz * ux - ky
+                gzy += cz * uy + kx
+                gzz += cz * uz
+    B[0] += bx
+    B[1] += by
+    B[2] += bz
+    if order > 0:
+        gradient[0, 0] += gxx
+        gradient[0, 1] += gxy
+        gradient[0, 2] += gxz
+        gradient[1, 0] += gyx
+        gradient[1, 1] += gyy
+        gradient[1, 2] += gyz
+        gradient[2, 0] += gzx
+        gradient[2, 1] += gzy
+        gradient[2, 2] += gzz
+
+
 @kernel
 def _evaluate(
     points: Points,
@@ -163,10 +236,9 @@ def _evaluate(
     susceptibility: Floats,
     centre: Floats,
     size: Floats,
-    far_places: Floats,
-    far_strengths: Floats,
-    near_places: Floats,
-    near_strengths: Floats,
+    distant: Floats,
+    places: Floats,
+    strengths: Floats,
     barycentric: Floats,
     weights: Floats,
     order: int,
@@ -176,6 +248,7 @@ def _evaluate(
 ) -> None:
     """Sum all triangles at all points, each by the rule that its distance asks for."""
     stack = np.empty((4 * _DEEPEST, 7))  # corner coordinates of sub-triangles, and their depth
+    share = np.empty(nodes.shape[0])  # 1 for triangles that the far rule serves, else 0
     b = np.empty(3)
     g = np.zeros((3, 3))
     h = np.zeros((3, 3, 3))
@@ -186,15 +259,16 @@ def _evaluate(
         h[:] = 0.0
         for t in range(nodes.shape[0]):
             dx, dy, dz = x - centre[t, 0], y - centre[t, 1], z - centre[t, 2]
-            ratio2 = (dx * dx + dy * dy + dz * dz) / (size[t] * size[t])
-            if ratio2 > _FAR * _FAR:
-                for q in range(far_places.shape[1]):
-                    at, strength = far_places[t, q], far_strengths[t, q]
-                    _add_element(x - at[0], y - at[1], z - at[2], strength[0], strength[1], strength[2], order, b, g, h)
-            elif ratio2 > _NEAR * _NEAR:
-                for q in range(near_places.shape[1]):
-                    at, strength = near_places[t, q], near_strengths[t, q]
-                    _add_element(x - at[0], y - at[1], z - at[2], strength[0], strength[1], strength[2], order, b, g, h)
+            share[t] = 1.0 if dx * dx + dy * dy + dz * dz > (_FAR * size[t]) ** 2 else 0.0
+        _add_distant(x, y, z, distant, share, order, b, g, h)
+        for t in range(nodes.shape[0]):
+            if share[t] == 1.0:
+                continue
+            dx, dy, dz = x - centre[t, 0], y - centre[t, 1], z - centre[t, 2]
+            if dx * dx + dy * dy + dz * dz > (_NEAR * size[t]) ** 2:
+                for q in range(places.shape[1]):
+                    at, K = places[t, q], strengths[t, q]
+                    _add_element(x - at[0], y - at[1], z - at[2], K[0], K[1], K[2], order, b, g, h)
             else:
                 _add_close(
                     x,

@@ -95,10 +95,9 @@ def _half_disc(occ: Any, radius: float) -> int:
 def _size_fields(gmsh: Any, dimension: int, bodies: list[int], sizes: Sizes, radius: float) -> None:
     """Small along rims (where the magnetisation ends in an edge), growing along the surface and into the air."""
     field = gmsh.model.mesh.field
-    surface = gmsh.model.getBoundary([(dimension, tag) for tag in bodies], combined=False, oriented=False)
-    rims = gmsh.model.getBoundary(surface, combined=False, oriented=False)
-    walls = sorted({tag for _, tag in surface})
-    edges = sorted({tag for _, tag in rims})
+    surfaces = gmsh.model.getBoundary([(dimension, tag) for tag in bodies], combined=False, oriented=False)
+    walls = sorted({tag for _, tag in surfaces})
+    edges = sorted(set().union(*(_rims(gmsh, dimension - 1, wall) for wall in walls)))
 
     def threshold(kind: str, tags: list[int], low: float, high: float, reach: float) -> int:
         distance = field.add("Distance")
@@ -125,6 +124,12 @@ def _size_fields(gmsh: Any, dimension: int, bodies: list[int], sizes: Sizes, rad
     ):
         gmsh.option.setNumber(option, 0)
     gmsh.option.setNumber("Mesh.MeshSizeMax", sizes.outer)
+
+
+def _rims(gmsh: Any, dimension: int, wall: int) -> set[int]:
+    """Curves (points) where a wall ends; seams, where a closed wall meets itself, are no rims."""
+    ends = [tag for _, tag in gmsh.model.getBoundary([(dimension, wall)], combined=False, oriented=False)]
+    return {tag for tag in ends if ends.count(tag) == 1}
 
 
 def _read(gmsh: Any, dimension: int, body_of: dict[int, int], names: tuple[str, ...], radius: float) -> Mesh:
