@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from magfem.errors import ConvergenceError, InputError
+from magfem.errors import InputError
 from magfem.fem.solution import Solution, describe
 from magfem.fields.field import Field
 from magfem.fields.norms import relative_errors
@@ -58,7 +58,8 @@ def fit(source: Field, recipe: Recipe | None = None) -> FieldModel:
     recipe: family, targets and seed; by default what suits the device. A source that is not a Solution must
     bring its device as `source.geometry`, or the recipe must name one.
     The order is the smallest whose errors stay below half the targets on points of their own, with a
-    condition number up to 1e7. Raises InputError for a source without a device.
+    condition number up to 1e7. Raises InputError for a source without a device,
+    and for a field that is not finite or vanishes.
     """
     recipe = recipe or Recipe()
     geometry = recipe.geometry or getattr(source, "geometry", None)
@@ -112,6 +113,10 @@ def fit(source: Field, recipe: Recipe | None = None) -> FieldModel:
 def _sample(source: Field, region: Shell, rng: np.random.Generator, layers: int, per_layer: int) -> Samples:
     points = region.layers(rng, layers, per_layer)
     B, gradient = source.jet(points, 1)
+    if not (np.isfinite(B).all() and np.isfinite(gradient).all()):
+        raise InputError("cannot fit this field: it holds values that are not finite in the device's region")
+    if not (B.any(axis=(1, 2)).all() and gradient.any(axis=(1, 2, 3)).all()):
+        raise InputError("cannot fit this field: it vanishes at some distance from the device, or does not change")
     return Samples(points, B, gradient)
 
 
@@ -133,10 +138,7 @@ def _climb(geometry: Geometry, recipe: Recipe, samples: dict[str, Samples]) -> l
 
 def _choose(tried: list[Fitted], recipe: Recipe) -> Fitted:
     """The first candidate below half the targets, else the best."""
-    chosen = min(tried, key=lambda one: _score(one, recipe))
-    if not np.isfinite(_score(chosen, recipe)):
-        raise ConvergenceError("no candidate could be fitted: the field data hold values that are not finite")
-    return chosen
+    return min(tried, key=lambda one: _score(one, recipe))
 
 
 def _score(fitted: Fitted, recipe: Recipe) -> float:
