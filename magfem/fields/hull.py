@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass
 from typing import Any, Protocol
 
@@ -97,4 +98,7 @@ def hull_from_dict(data: dict[str, Any]) -> Hull:
     kind = values.pop("kind", None)
     if kind not in _KINDS:
         raise InputError(f"unknown hull kind {kind!r}; known: {', '.join(_KINDS)}")
-    return _KINDS[kind](**values)
+    sizes = {key: float(value) for key, value in values.items()}
+    if not all(0 < size < math.inf for size in sizes.values()):
+        raise InputError("a hull needs finite sizes above 0")
+    return _KINDS[kind](**sizes)

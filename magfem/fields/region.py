@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -125,5 +126,8 @@ def region_from_dict(data: dict[str, Any]) -> Region:
     if data.get("kind") == "everywhere":
         return Everywhere()
     if data.get("kind") == "shell":
-        return Shell(hull_from_dict(data["hull"]), data["clearance"], data["extent"])
+        shell = Shell(hull_from_dict(data["hull"]), float(data["clearance"]), float(data["extent"]))
+        if not 0 <= shell.clearance < shell.extent < math.inf:
+            raise InputError("a shell needs a clearance of 0 or more and a larger extent")
+        return shell
     raise InputError(f"unknown region kind {data.get('kind')!r}; known: everywhere, shell")

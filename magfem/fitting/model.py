@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -17,8 +16,11 @@ from magfem.fields.terms import HARMONIC, LOOP, Terms, concatenate, frame_about,
 from magfem.files import read_json, write_json
 from magfem.geometry.catalogue import resolve, short_path
 from magfem.typing import Floats, Integers, Jet, Points
+from magfem.units import one_line
 
 FORMAT, VERSION = "magfem-model", 1
+HIGHEST_DEGREE = 85
+"""Of harmonics in a file; factorials of twice this still fit a float."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,30 +94,38 @@ def load_model(name_or_path: str | Path) -> FieldModel:
     try:
         for key in ("name", "unit", "terms", "parameter", "covariance", "region", "report", "provenance"):
             data[key]
+        for key, kind, words in (("name", str, "a text"), ("report", dict, "a table"), ("provenance", dict, "a table")):
+            if not isinstance(data[key], kind):
+                raise ValueError(words)
+        key = "unit"
+        if data["unit"] not in ("T", "T/A"):
+            raise ValueError('"T" or "T/A"')
         key = "terms"
         lowered = terms_from_list(data["terms"])
-        key = "covariance"
-        covariance = np.array(data["covariance"], dtype=float)
         key = "parameter"
-        parameter = np.array(data["parameter"], dtype=np.int64)
-        if parameter.shape != lowered.coefficient.shape:
+        parameter = np.array(data["parameter"])
+        if parameter.shape != lowered.coefficient.shape or parameter.dtype.kind != "i" or parameter.min() < 0:
             raise ValueError("one index for each coefficient")
+        key = "covariance"
+        covariance = _numbers(data["covariance"])
+        if covariance.shape != (parameter.max() + 1,) * 2:
+            raise ValueError("one row and one column for each parameter")
         key = "region"
         region = region_from_dict(data["region"])
         if not isinstance(region, Shell):
             raise ValueError("a shell around a hull")
-        key = "unit"
-        if data["unit"] not in ("T", "T/A"):
-            raise ValueError('"T" or "T/A"')
-        key = "report"
-        if not all(float(data["report"]["bound"][name]) > 0 for name in ("B", "gradient")):
-            raise ValueError("positive bounds of B and gradient")
-        key = "provenance"
-        if not isinstance(data["provenance"]["device"], dict):
-            raise ValueError("a device")
-    except (AttributeError, IndexError, InputError, KeyError, TypeError, ValueError) as error:
-        reason = f"missing key {error}" if isinstance(error, KeyError) else f"expected {error}"
-        raise CardError(f"not a whole field model: {reason}", f"{shown}: {key}") from None
+        key = "report.bound"
+        if not all(_number(data["report"]["bound"][name]) >= 0 for name in ("B", "gradient")):
+            raise ValueError("relative errors of B and gradient")
+    except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError, InputError) as error:
+        reason = f"{key} is not laid out as in a field model"
+        if isinstance(error, KeyError):
+            reason = f"missing key {error}"
+        elif isinstance(error, InputError):
+            reason = str(error)
+        elif isinstance(error, ValueError):
+            reason = f"expected {error}"
+        raise CardError(f"not a whole field model: {one_line(reason)}", f"{shown}: {key}") from None
     return FieldModel(
         name=data["name"],
         lowered=lowered,
@@ -152,7 +162,7 @@ def terms_to_list(terms: Terms) -> list[dict[str, Any]]:
 def terms_from_list(data: list[dict[str, Any]]) -> Terms:
     """Inverse of `terms_to_list`; `azimuth` may be left out where it does not matter.
 
-    Raises KeyError, TypeError or ValueError for what is not a term.
+    Raises KeyError, TypeError, ValueError … for what is not a term.
     """
     if not isinstance(data, list) or not data:
         raise ValueError("a list of at least one term")
@@ -160,15 +170,20 @@ def terms_from_list(data: list[dict[str, Any]]) -> Terms:
 
 
 def _source(term: dict[str, Any]) -> Terms:
-    centre = np.array(term["centre"], dtype=float)
-    radius, coefficients = float(term["radius"]), np.array(term["coefficients"], dtype=float)
-    direction = np.array(term["direction"], dtype=float)
+    if not isinstance(term, dict):
+        raise ValueError("terms that are tables")
+    if term["kind"] not in ("loop", "harmonics"):
+        raise ValueError(f'kind "loop" or "harmonics", got {term["kind"]!r}')
+    centre, direction, coefficients = (_numbers(term[key]) for key in ("centre", "direction", "coefficients"))
+    radius = _number(term["radius"])
     if centre.shape != (3,) or direction.shape != (3,) or not np.linalg.norm(direction) > 0:
         raise ValueError("centre and direction of three numbers")
-    if not (radius > 0 and math.isfinite(radius) and np.isfinite(coefficients).all()):
-        raise ValueError("a positive radius and finite coefficients")
+    if not radius > 0 or coefficients.ndim != 1:
+        raise ValueError("a positive radius and a list of coefficients")
     if "azimuth" in term:
-        x = np.array(term["azimuth"], dtype=float)
+        x = _numbers(term["azimuth"])
+        if x.shape != (3,):
+            raise ValueError("azimuth of three numbers")
         # The stored axes are used as they are: making them orthogonal again would change bits.
         frame = np.stack([x, np.cross(direction, x), direction], axis=1)
         if not np.allclose(frame.T @ frame, np.eye(3), atol=1e-9):
@@ -176,12 +191,36 @@ def _source(term: dict[str, Any]) -> Terms:
     else:
         frame = frame_about(direction)
     if term["kind"] == "loop":
+        if coefficients.size != 1:
+            raise ValueError("one coefficient for a loop")
         return loops(centre[None], np.array([radius]), coefficients, frame)
-    if term["kind"] != "harmonics":
-        raise ValueError(f'kind "loop" or "harmonics", got {term["kind"]!r}')
-    degrees, orders = term["degrees"], term["orders"]
-    if not len(degrees) == len(orders) == len(term["parts"]) == coefficients.size:
+    degrees, orders, parts = term["degrees"], term["orders"], term["parts"]
+    if not len(degrees) == len(orders) == len(parts) == coefficients.size:
         raise ValueError("degrees, orders, parts and coefficients of one length")
-    if any(not 0 <= m <= n or n < 1 for n, m in zip(degrees, orders, strict=True)):
-        raise ValueError("orders between 0 and their degree, and degrees from 1 (there is no monopole)")
-    return harmonics(radius, degrees, orders, [part == "sin" for part in term["parts"]], coefficients, centre, frame)
+    if not all(type(number) is int for number in (*degrees, *orders)):
+        raise ValueError("whole numbers as degrees and orders")
+    if any(not 0 <= m <= n or not 1 <= n <= HIGHEST_DEGREE for n, m in zip(degrees, orders, strict=True)):
+        raise ValueError(
+            f"orders between 0 and their degree, and degrees from 1 to {HIGHEST_DEGREE} (there is no monopole)"
+        )
+    if not set(parts) <= {"cos", "sin"}:
+        raise ValueError('parts "cos" or "sin"')
+    return harmonics(radius, degrees, orders, [part == "sin" for part in parts], coefficients, centre, frame)
+
+
+def _numbers(data: Any) -> Floats:
+    """A list of lists … of finite numbers as an array."""
+    try:
+        array = np.array(data)
+    except ValueError:
+        array = np.array(None)
+    if array.dtype.kind not in "fiu" or not np.isfinite(array).all():
+        raise ValueError("finite numbers, in lists of one length")
+    return array.astype(float)
+
+
+def _number(data: Any) -> float:
+    array = _numbers(data)
+    if array.shape != ():
+        raise ValueError("one number")
+    return float(array)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -31,11 +33,9 @@ class Recipe:
     resolution: float = 1.0
 
     def __post_init__(self) -> None:
-        if self.family is not None and self.family not in FAMILIES:
-            raise InputError(f"unknown family {self.family!r}; known: {', '.join(FAMILIES)}")
-        for key in ("target_B", "target_gradient"):
-            if not 0 < getattr(self, key) < 1:
-                raise InputError(f"{key} must be a relative error between 0 and 1, got {getattr(self, key)}")
+        for key in _RULES:
+            if complaint := _complaint(key, getattr(self, key)):
+                raise InputError(f"{complaint}, got {getattr(self, key)!r}")
 
 
 def load_recipe(name_or_path: str | Path) -> Recipe:
@@ -45,26 +45,45 @@ def load_recipe(name_or_path: str | Path) -> Recipe:
     table.only("device", "family", "seed", "target", "solve")
     values: dict[str, Any] = {"geometry": load_geometry(_device_path(table, resolve(*where)))}
     if "family" in table:
-        values["family"] = table.text("family")
-        if values["family"] not in FAMILIES:
-            raise table.error(f"unknown family; known: {', '.join(FAMILIES)}", "family")
+        values["family"] = _checked(table, "family", table.text("family"))
     if "seed" in table:
-        values["seed"] = int(table.number("seed"))
+        values["seed"] = int(_checked(table, "seed", table.number("seed")))
     if "target" in table:
         target = table.table("target")
         target.only("B", "gradient")
         for key in target.values:
-            values[f"target_{key}"] = target.number(key)
-            if not 0 < values[f"target_{key}"] < 1:
-                raise target.error(f"{key} must be a relative error between 0 and 1", key)
+            values[f"target_{key}"] = _checked(target, key, target.number(key), f"target_{key}")
     if "solve" in table:
         solve = table.table("solve")
         solve.only("dimension", "resolution")
         if "dimension" in solve:
-            values["dimension"] = int(solve.number("dimension"))
+            values["dimension"] = int(_checked(solve, "dimension", solve.number("dimension")))
         if "resolution" in solve:
-            values["resolution"] = solve.number("resolution")
+            values["resolution"] = _checked(solve, "resolution", solve.number("resolution"))
     return Recipe(**values)
+
+
+_RULES: dict[str, tuple[Callable[[Any], bool], str]] = {
+    "family": (lambda value: value is None or value in FAMILIES, f"unknown family; known: {', '.join(FAMILIES)}"),
+    "target_B": (lambda value: 0 < value < 1, "target_B must be a relative error between 0 and 1"),
+    "target_gradient": (lambda value: 0 < value < 1, "target_gradient must be a relative error between 0 and 1"),
+    "seed": (lambda value: 0 <= value < math.inf and value == int(value), "seed must be a whole number, 0 or more"),
+    "dimension": (lambda value: value in (None, 2, 3), "dimension must be 2 or 3"),
+    "resolution": (lambda value: 0 < value < math.inf, "resolution must be positive and finite"),
+}
+
+
+def _complaint(key: str, value: Any) -> str:
+    """What is wrong with a recipe's value; empty when nothing is."""
+    holds, sentence = _RULES[key]
+    return "" if holds(value) else sentence
+
+
+def _checked(table: Table, key: str, value: Any, field: str = "") -> Any:
+    """A value of the file, which must keep the rule of the recipe's `field` (default: `key`)."""
+    if complaint := _complaint(field or key, value):
+        raise table.error(complaint, key)
+    return value
 
 
 def _device_path(table: Table, recipe: Path) -> str | Path:
