@@ -31,7 +31,8 @@ CONDITION = 1e7
 
 _GRADIENT_WEIGHT = 0.1  # relative errors of the gradient weigh a tenth of those of B, as the targets do
 _SAFETY = 1.5  # on the held-out maximum: other random points may hit a little harder
-_SAMPLES = {"training": (28, 24), "selection": (24, 24), "heldout": (64, 34)}  # layers, points in each
+_SAMPLES = {"training": (28, 24, 0), "selection": (24, 24, 10), "heldout": (64, 34, 15)}
+"""Layers, points in each, and further layers at the clearance itself: there errors are largest, and local."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +74,7 @@ def fit(source: Field, recipe: Recipe | None = None) -> FieldModel:
         name: _sample(source, region, np.random.default_rng(seed), *shape)
         for (name, shape), seed in zip(_SAMPLES.items(), seeds, strict=True)
     }
-    log.info("field: %d sample points", sum(a * b for a, b in _SAMPLES.values()))
+    log.info("field: %d sample points", sum(data.points[..., 0].size for data in samples.values()))
     tried = _climb(geometry, recipe, samples)
     chosen = _choose(tried, recipe)
     terms = chosen.candidate.with_parameters(chosen.solved.parameters)
@@ -103,15 +104,22 @@ def fit(source: Field, recipe: Recipe | None = None) -> FieldModel:
             "bound": bound,
             "worst": _worst(jets["heldout"], samples["heldout"], region),
             "candidates": [{**_headline(one), "selection": one.selection} for one in tried],
-            "comparison": [_compare(candidate, samples, terms) for candidate in dissertation_families(geometry)],
+            "comparison": [
+                _compare(candidate, samples, terms)
+                for candidate in dissertation_families(geometry)
+                if _has_room(candidate, samples)
+            ],
         },
         provenance=_provenance(source, geometry),
         unit=source.unit,
     )
 
 
-def _sample(source: Field, region: Shell, rng: np.random.Generator, layers: int, per_layer: int) -> Samples:
-    points = region.layers(rng, layers, per_layer)
+def _sample(
+    source: Field, region: Shell, rng: np.random.Generator, layers: int, per_layer: int, nearest: int
+) -> Samples:
+    spread = region.layers(rng, layers, per_layer)
+    points = np.concatenate([spread, region.hull.offset_points(np.full(nearest, region.clearance), per_layer, rng)])
     B, gradient = source.jet(points, 1)
     if not (np.isfinite(B).all() and np.isfinite(gradient).all()):
         raise InputError("cannot fit this field: it holds values that are not finite in the device's region")
@@ -190,6 +198,15 @@ def _headline(fitted: Fitted) -> dict[str, Any]:
         "parameters": candidate.parameters,
         "condition": fitted.solved.condition,
     }
+
+
+def _has_room(candidate: Candidate, samples: dict[str, Samples]) -> bool:
+    """Whether the candidate's window, if it has one, holds points enough to fit it and to judge it."""
+    window = candidate.window or Everywhere()
+    return all(
+        np.count_nonzero(window.contains(samples[name].points)) >= 5 * candidate.parameters
+        for name in ("training", "heldout")
+    )
 
 
 def _compare(candidate: Candidate, samples: dict[str, Samples], ours: Terms) -> dict[str, Any]:
