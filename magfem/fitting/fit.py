@@ -37,11 +37,15 @@ _SAMPLES = {"training": (28, 24, 0), "selection": (24, 24, 10), "heldout": (64, 
 
 @dataclass(frozen=True)
 class Samples:
-    """Field data on layers of equal hull distance: points, B and gradient, shapes (l, p, …)."""
+    """Field data on layers of equal hull distance: points, B and gradient, shapes (l, p, …).
+
+    The first `spread` layers are spread over the region, the others lie at its clearance.
+    """
 
     points: Points
     B: Floats
     gradient: Floats
+    spread: int
 
 
 @dataclass(frozen=True)
@@ -125,7 +129,7 @@ def _sample(
         raise InputError("cannot fit this field: it holds values that are not finite in the device's region")
     if not (B.any(axis=(1, 2)).all() and gradient.any(axis=(1, 2, 3)).all()):
         raise InputError("cannot fit this field: it vanishes at some distance from the device, or does not change")
-    return Samples(points, B, gradient)
+    return Samples(points, B, gradient, layers)
 
 
 def _climb(geometry: Geometry, recipe: Recipe, samples: dict[str, Samples]) -> list[Fitted]:
@@ -169,13 +173,13 @@ def _solve(candidate: Candidate, samples: Samples) -> LeastSquares:
 
 
 def _errors(jet: tuple[Floats, ...], samples: Samples, counted: Booleans | None = None) -> dict[str, Any]:
-    """Largest and root-mean-square relative errors over the `counted` (l, p) samples (default: all)."""
-    points = samples.points.shape[:2] if counted is None else samples.points[counted].shape[:1]
-    result: dict[str, Any] = {"points": int(np.prod(points))}
+    """Largest relative errors over the `counted` (l, p) samples (default: all); root mean square of the spread ones."""
+    counted = np.ones(samples.points.shape[:2], dtype=bool) if counted is None else counted
+    spread = counted & (np.arange(counted.shape[0]) < samples.spread)[:, None]
+    result: dict[str, Any] = {"points": int(np.count_nonzero(counted))}
     for key, found, truth in zip(("B", "gradient"), jet, (samples.B, samples.gradient), strict=True):
         errors = relative_errors(found.reshape(truth.shape), truth)
-        errors = errors if counted is None else errors[counted]
-        result[key] = {"max": float(errors.max()), "rms": float(np.sqrt(np.mean(errors**2)))}
+        result[key] = {"max": float(errors[counted].max()), "rms": float(np.sqrt(np.mean(errors[spread] ** 2)))}
     return result
 
 
@@ -204,7 +208,7 @@ def _has_room(candidate: Candidate, samples: dict[str, Samples]) -> bool:
     """Whether the candidate's window, if it has one, holds points enough to fit it and to judge it."""
     window = candidate.window or Everywhere()
     return all(
-        np.count_nonzero(window.contains(samples[name].points)) >= 5 * candidate.parameters
+        np.count_nonzero(window.contains(samples[name].points[: samples[name].spread])) >= 5 * candidate.parameters
         for name in ("training", "heldout")
     )
 
