@@ -1,0 +1,111 @@
+"""The documentation as a reader uses it: its Python runs, its command lines parse, its links lead somewhere."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from magfem.cli.program import command_line
+
+ROOT = Path(__file__).parents[2]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), ROOT / "benchmarks" / "README.md"]
+BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+
+
+def on_axis(z: float) -> float:
+    """B_z (T) of the rigid ring 4 × 1.5 × 1 mm, 1.35 T, on its axis at z mm: the elementary formula of a solenoid."""
+    return (
+        1.35 / 2 * sum(s * t * (z + t / 2) / np.hypot(z + t / 2, r) for s, r in ((1, 2), (-1, 0.75)) for t in (1, -1))
+    )
+
+
+RIGID, RIGID_SLOPE = on_axis(3.0), (on_axis(3.001) - on_axis(2.999)) / 2e-6
+
+# For every Python block of a page, in order: an expression, its value, and the relative tolerance.
+EXPECTED = {
+    "tutorial.md": [
+        ("geometry.volume * 1e9", 10.7992, 1e-4),
+        ("solution.error['B'] < 5e-6", True, 0),
+        ("B[2]", 0.973 * RIGID, 5e-3),  # less 2.7 % of demagnetisation
+        ("model.report['bound']['B'] < 5e-4", True, 0),
+        ("gradient[0, 2, 2]", 0.973 * RIGID_SLOPE, 5e-3),
+        ("far[2] / (2e-7 * model.moment[2] / 0.1**3)", 1.0, 5e-3),  # a dipole, far away
+        ("check.passed", True, 0),
+    ],
+    "how-to.md": [
+        ("disc.region.extent", 12e-3, 1e-9),
+        ("ring.moment[2]", 0.0116016, 1e-4),
+        ("oblique.material.magnetisation[2]", 0.5**0.5, 1e-9),
+        ("gradient.trace() / abs(gradient).max()", 0.0, 1e-12),
+        ("B.shape[0] * B.shape[1]", 41 * 101, 0),
+        ("ring_model.region.extent", 6e-3, 1e-9),
+        (
+            "abs(B_of_model('rotor.json', 2 * somewhere) / rotor.B(2 * somewhere) - 1).max()"
+            " + abs(B_of_model('ring.json', somewhere) / ring_model.B(somewhere) - 1).max()",
+            0.0,
+            1e-10,
+        ),
+        ("check.passed", True, 0),
+        ("tight.error['B'] <= 1e-3", True, 0),
+        ("finer.report['heldout']['B']['max'] <= 3e-5", True, 0),
+        ("abs(again.B([0, 0, 3e-3]) - solution.B([0, 0, 3e-3])).max()", 0.0, 0.0),
+    ],
+}
+
+
+def blocks(page: Path, language: str) -> list[str]:
+    return [text for kind, text in BLOCK.findall(page.read_text(encoding="utf-8")) if kind == language]
+
+
+@pytest.mark.parametrize("name", EXPECTED)
+def test_python_blocks_give_the_numbers_they_promise(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    code = blocks(ROOT / "docs" / name, "python")
+    assert len(code) == len(EXPECTED[name])
+    names: dict[str, object] = {}
+    for number, (text, (expression, value, tolerance)) in enumerate(zip(code, EXPECTED[name], strict=True)):
+        exec(compile(text, f"{name}, Python block {number + 1}", "exec"), names)
+        found = eval(expression, names)
+        assert found == pytest.approx(value, rel=tolerance, abs=tolerance if value == 0 else 0), (number, expression)
+
+
+def test_readme_example_runs(tmp_path, monkeypatch, capsys):
+    """The example of the README prints what the block after it shows."""
+    monkeypatch.chdir(tmp_path)
+    page = ROOT / "README.md"
+    exec(compile(blocks(page, "python")[0], "README.md", "exec"), {})
+    printed = capsys.readouterr().out.split()
+    shown = blocks(page, "text")[0].split()
+    assert len(printed) == len(shown)
+    for ours, theirs in zip(printed, shown, strict=True):
+        try:
+            assert float(ours.strip("[](),")) == pytest.approx(float(theirs.strip("[](),")), rel=0.05, abs=1e-6)
+        except ValueError:
+            assert ours == theirs
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_command_lines_parse(page):
+    """Every `magfem …` line of a shell block is one that the command line understands."""
+    parser = command_line()
+    for block in blocks(page, "sh"):
+        for line in block.splitlines():
+            words = shlex.split(line, comments=True)
+            if words[:1] == ["magfem"]:
+                assert callable(parser.parse(words[1:]).run), line
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_links_lead_to_files(page):
+    for target in re.findall(r"\]\(([^)#:]+)\)", page.read_text(encoding="utf-8")):
+        assert (page.parent / target).exists(), target
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_files_that_pages_name_exist(page):
+    for name in re.findall(r"`((?:magfem|tests|benchmarks|docs|tools)/[\w/.]+)`", page.read_text(encoding="utf-8")):
+        assert (ROOT / name).exists(), name
