@@ -55,26 +55,46 @@ def read_json(path: Path, what: str) -> Any:
         raise InputError(f"{what} cannot be read: {error} [{path}]") from None
     except json.JSONDecodeError as error:
         raise InputError(f"{what} is not valid JSON (line {error.lineno}: {error.msg}) [{path}]") from None
+    except RecursionError:
+        raise InputError(f"{what} is nested too deeply [{path}]") from None
+    except ValueError:  # Python's own limit on the digits of an integer
+        raise InputError(f"{what} holds a number of too many digits [{path}]") from None
 
 
-def write_folder(path: Path, fill: Callable[[Path], None]) -> None:
-    """Make or replace the folder `path` by what `fill` puts into an empty one."""
+def write_folder(path: Path, fill: Callable[[Path], None], owned: frozenset[str]) -> None:
+    """Make or replace the folder `path` by what `fill` puts into an empty one.
+
+    owned: the names that `fill` gives; a folder that holds any other is left alone (InputError).
+    """
+    check_folder(path, owned)
+    path = path.resolve()  # a link to a folder stays, its target is replaced
     with _cannot_write(path):
         path.parent.mkdir(parents=True, exist_ok=True)
-        draft = Path(tempfile.mkdtemp(prefix=f".{path.name}.", dir=path.parent))
+        hidden = Path(tempfile.mkdtemp(prefix=f".{path.name}.", dir=path.parent))
+        draft, old = hidden / "draft", hidden / "old"
         try:
-            os.chmod(draft, 0o777 & ~_umask())
+            draft.mkdir()
             fill(draft)
-            old = None
+            check_folder(path, owned)  # filling may have taken minutes
             if path.exists():
-                old = Path(tempfile.mkdtemp(prefix=f".{path.name}.", dir=path.parent))
                 os.replace(path, old)
-            os.replace(draft, path)
-            if old is not None:
-                shutil.rmtree(old, ignore_errors=True)
-        except BaseException:
-            shutil.rmtree(draft, ignore_errors=True)
-            raise
+            try:
+                os.replace(draft, path)
+            except BaseException:
+                if old.exists():
+                    os.replace(old, path)
+                raise
+        finally:
+            if path.exists() or not old.exists():  # else the hidden folder holds the only copy
+                shutil.rmtree(hidden, ignore_errors=True)
+
+
+def check_folder(path: Path, owned: frozenset[str]) -> None:
+    """Raise InputError unless `path` is free, or a folder that holds nothing but `owned` names."""
+    with _cannot_write(path):
+        foreign = sorted({child.name for child in path.iterdir()} - owned) if path.exists() else []
+    if foreign:
+        raise InputError(f"this folder holds other files ({foreign[0]}): choose another or an empty one [{path}]")
 
 
 @contextmanager

@@ -274,10 +274,16 @@ def test_no_command_at_all_gets_the_help(capsys: pytest.CaptureFixture[str]) -> 
         (f"solve {RING} -o file", "expected a folder to write, got a file [file]"),
         (f"solve {RING} -o no/where", "there is no folder"),
         (f"solve {RING} -o .", "the current folder cannot be replaced"),
-        (f"solve {RING} -o full", "the folder would be replaced, but holds 'precious.txt'"),
+        (
+            f"solve {RING} -o full",
+            "this folder holds other files (precious.txt): choose another or an empty one [full]",
+        ),
         (f"mesh {RING} -o ring.stl", "expected a file that ends in .msh or .vtu"),
         (f"mesh {RING} -o ring.vtu --resolution 1e9", "resolution must lie between"),
-        ("mesh rotor_1x3 -o ring.vtu --dimension 2", "use dimension 3"),
+        (
+            "mesh rotor_1x3 -o ring.vtu --dimension 2",
+            "only bodies of revolution with axial magnetisation can be solved in dimension 2: use 3",
+        ),
         (f"fit {RING} -o full", "expected a file to write, got a directory [full]"),
         (f"fit {RING} -o no/where.json", "there is no folder no [no/where.json]"),
         (f"fit {RING} -o ring.html", "expected a file that ends in .json [ring.html]"),

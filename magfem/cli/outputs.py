@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from magfem.errors import InputError
+from magfem.files import check_folder
 
 
 def output_file(text: str, endings: Sequence[str]) -> Path:
@@ -22,10 +23,10 @@ def output_file(text: str, endings: Sequence[str]) -> Path:
     return path
 
 
-def output_folder(text: str, contents: Sequence[str]) -> Path:
+def output_folder(text: str, owned: frozenset[str]) -> Path:
     """The folder that a user wants made or replaced.
 
-    Raises InputError when it is a file, its own folder is missing, or it holds anything but `contents`: what a
+    Raises InputError when it is a file, its own folder is missing, or it holds anything but `owned`: what a
     former run wrote may go, other files may not.
     """
     path = Path(text).resolve()
@@ -34,10 +35,7 @@ def output_folder(text: str, contents: Sequence[str]) -> Path:
     _check_parent(path, text)
     if Path.cwd().is_relative_to(path):
         raise InputError(f"the current folder cannot be replaced: name a new one [{text}]")
-    if path.is_dir():
-        others = sorted({child.name for child in path.iterdir()} - set(contents))
-        if others:
-            raise InputError(f"the folder would be replaced, but holds {others[0]!r}: name a new one [{text}]")
+    check_folder(Path(text), owned)
     return path
 
 

@@ -49,9 +49,9 @@ def run(options: Namespace) -> int:
 
 def _data(geometry: Geometry, picture: Path) -> dict[str, Any]:
     """The device's numbers, SI units."""
-    from magfem.fem.solution import describe
     from magfem.fields.hull import hull_to_dict
     from magfem.fields.region import region_to_dict
+    from magfem.geometry import describe
 
     return {
         **describe(geometry),

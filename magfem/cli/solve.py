@@ -12,9 +12,6 @@ from magfem.cli.parser import CommandLine, add_dimension, add_resolution
 if TYPE_CHECKING:
     from magfem.fem import Solution
 
-FILES = ("fields.npz", "solution.vtu", "summary.json")
-"""What a saved solution consists of."""
-
 
 def add(commands: CommandLine) -> None:
     """Add the command."""
@@ -43,10 +40,11 @@ def add(commands: CommandLine) -> None:
 
 def run(options: Namespace) -> int:
     """Solve, keep the solution when asked to, print what it is worth."""
-    folder = options.output and output_folder(options.output, FILES)
     from magfem.fem import solve
+    from magfem.fem.solution import FILES
     from magfem.geometry import load_geometry
 
+    folder = options.output and output_folder(options.output, FILES)
     solution = solve(load_geometry(options.card), options.dimension, options.resolution, options.tolerance)
     if folder:
         solution.save(folder)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,10 +15,15 @@ from magfem.fem.surface_currents import SurfaceCurrents
 from magfem.fields.field import Evaluated, Unit
 from magfem.fields.region import Everywhere, Region, region_to_dict
 from magfem.files import read_json, write_folder, write_json
-from magfem.geometry import Geometry, card_text, geometry_from_text
+from magfem.geometry import Geometry, describe, geometry_from_text
 from magfem.mesh.export import write_mesh
 from magfem.mesh.mesh import Mesh
 from magfem.typing import Floats, Jet, Points
+
+__all__ = ["FILES", "Solution", "describe", "load_solution"]
+
+FILES = frozenset({"solution.vtu", "fields.npz", "summary.json"})
+"""What a saved solution consists of."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,8 +77,11 @@ class Solution(Evaluated):
         }
 
     def save(self, folder: str | Path) -> None:
-        """Write solution.vtu (for ParaView), fields.npz (every bit) and summary.json, or nothing at all."""
-        write_folder(Path(folder), self._fill)
+        """Write solution.vtu (for ParaView), fields.npz (every bit) and summary.json, or nothing at all.
+
+        A folder of a former solution is replaced; one that holds any other file is left alone (InputError).
+        """
+        write_folder(Path(folder), self._fill, FILES)
 
     def _fill(self, folder: Path) -> None:
         write_json(folder / "summary.json", self.summary)
@@ -94,29 +101,6 @@ class Solution(Evaluated):
             point_data={"potential": self.potential},
             cell_data={"B": _three(self.flux_density)},
         )
-
-
-def describe(geometry: Geometry) -> dict[str, Any]:
-    """What a device is, for summaries and provenance: kind, name, source, card and materials."""
-    text = card_text(geometry)
-    return {
-        "kind": geometry.kind,
-        "name": geometry.name,
-        "source": geometry.source,
-        "card": {
-            "path": geometry.origin.path if geometry.origin else "made in Python",
-            "sha256": hashlib.sha256(text.encode()).hexdigest() if not geometry.origin else geometry.origin.sha256,
-            "text": text,
-        },
-        "bodies": [
-            {
-                "name": body.name,
-                "remanence": body.material.remanence_vector.tolist(),
-                "recoil_permeability": body.material.recoil_permeability,
-            }
-            for body in geometry.bodies
-        ],
-    }
 
 
 def load_solution(folder: str | Path) -> Solution:

@@ -7,7 +7,7 @@ from magfem.geometry.geometry import Geometry
 from magfem.geometry.load import geometry_from_text, load_geometry
 from magfem.geometry.material import AXIAL, DIAMETRIC, PermanentMagnet
 from magfem.geometry.ring_magnet import RingMagnet
-from magfem.geometry.write import card_text
+from magfem.geometry.write import card_text, describe
 
 __all__ = [
     "AXIAL",
@@ -19,6 +19,7 @@ __all__ = [
     "PermanentMagnet",
     "RingMagnet",
     "card_text",
+    "describe",
     "geometry_from_text",
     "load_geometry",
 ]

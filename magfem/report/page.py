@@ -14,6 +14,7 @@ from markupsafe import Markup
 
 from magfem.fields import Shell
 from magfem.fitting import FieldModel
+from magfem.geometry import describe
 from magfem.report import measured, numbers
 from magfem.report.figures.style import DPI, Picture
 from magfem.report.pictures import draw
@@ -110,7 +111,7 @@ def _device(subject: Subject) -> dict[str, Any] | None:
         ]
     return {
         "kind": geometry.kind.replace("_", " "),
-        "card": geometry.origin.path if geometry.origin else "made in Python",
+        "card": describe(geometry)["card"]["path"],
         "source": geometry.source,
         "facts": facts,
     }

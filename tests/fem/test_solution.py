@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from importlib import import_module
 
 import meshio
@@ -26,6 +27,12 @@ def test_saved_solution_comes_back_to_the_bit(name, request, tmp_path):
         assert np.array_equal(ours, theirs)
     assert again.summary == json.loads(json.dumps(solution.summary))
     assert again.geometry == solution.geometry
+
+
+def test_saved_solution_of_a_changed_device_is_that_device(tmp_path):
+    ring = replace(magfem.load_geometry("ring_magnet_4x1.5x1"), length=2e-3)
+    solve(ring, resolution=0.5).save(tmp_path / "run")
+    assert magfem.load_solution(tmp_path / "run").geometry == ring
 
 
 def test_vtu_holds_potential_and_field(ring_3d, tmp_path):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 
 from magfem.errors import CardError, InputError
-from magfem.geometry import CylinderMagnet, RingMagnet, load_geometry
+from magfem.geometry import CylinderMagnet, RingMagnet, card_text, describe, geometry_from_text, load_geometry
 from magfem.geometry.catalogue import folder, names, resolve
 
 RING = """\
@@ -367,3 +368,14 @@ def test_an_unknown_name_is_told_the_nearest() -> None:
 def test_what_is_neither_name_nor_path_is_refused() -> None:
     with pytest.raises(InputError, match=r"^expected a device card's name or path, got 5$"):
         load_geometry(5)  # type: ignore[arg-type]
+
+
+def test_a_changed_device_gets_a_card_of_its_own(tmp_path):
+    """`dataclasses.replace` keeps the origin, which then no longer describes the device."""
+    ring = load_geometry("ring_magnet_4x1.5x1")
+    longer = replace(ring, length=2e-3)
+    card = describe(longer)["card"]
+    assert card["path"] == "made in Python" and card["sha256"] == sha256(card["text"].encode()).hexdigest()
+    assert geometry_from_text(card_text(longer), "card") == longer
+    assert card_text(ring) == ring.origin.text and describe(ring)["card"]["path"] == ring.origin.path
+    assert describe(replace(ring))["card"] == describe(ring)["card"]
