@@ -15,7 +15,7 @@ def in_chunks(run: Callable[[slice], None], count: int, at_least: int) -> None:
 
     Points are independent of each other, so the result does not depend on the number of threads.
     """
-    workers = max(1, min(os.cpu_count() or 1, count // at_least))
+    workers = max(1, min(_processors(), count // at_least))
     if workers == 1:
         run(slice(0, count))
         return
@@ -23,3 +23,8 @@ def in_chunks(run: Callable[[slice], None], count: int, at_least: int) -> None:
     bounds = np.linspace(0, count, pieces + 1).astype(int)
     with ThreadPoolExecutor(workers) as pool:
         list(pool.map(run, (slice(a, b) for a, b in pairwise(bounds))))
+
+
+def _processors() -> int:
+    """How many processors this process may use: fewer than the machine has in containers and under taskset."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

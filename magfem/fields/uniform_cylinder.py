@@ -31,9 +31,9 @@ from math import comb, factorial, perm, pi
 from typing import NamedTuple
 
 import numpy as np
-from scipy.constants import mu_0
 from scipy.special import ellipj, ellipkm1, eval_gegenbauer, factorial2, poch
 
+from magfem.constants import MU_0
 from magfem.typing import ArrayLike, Booleans, Floats, Jet
 
 NODES = 48  # on half a rim, even
@@ -86,10 +86,10 @@ def cylinder_jet(points: ArrayLike, radius: float, length: float, magnetisation:
     The surface belongs to the magnet; the rims as in `newton_derivatives`.
     """
     m = np.asarray(magnetisation, dtype=float)
-    b, *derivatives = (mu_0 * (tensor @ m) for tensor in newton_derivatives(points, radius, length, order + 2))
+    b, *derivatives = (MU_0 * (tensor @ m) for tensor in newton_derivatives(points, radius, length, order + 2))
     x, y, z = np.moveaxis(np.asarray(points, dtype=float) / radius, -1, 0)
     inside = _beside(z, length / (2 * radius)) & (x**2 + y**2 <= 1)
-    return b + mu_0 * m * inside[..., None], *derivatives
+    return b + MU_0 * m * inside[..., None], *derivatives
 
 
 def ring_jet(

@@ -5,8 +5,8 @@ from __future__ import annotations
 import magpylib
 import numpy as np
 import pytest
-from scipy.constants import mu_0
 
+from magfem.constants import MU_0
 from magfem.fields import uniform_cylinder
 from magfem.fields.uniform_cylinder import cylinder_jet, newton_derivatives, ring_jet
 from magfem.typing import Floats, Points
@@ -95,12 +95,12 @@ def test_axis_matches_elementary_formula(aspect):
     def cosine(x):
         return x / np.hypot(x, np.longdouble(RADIUS))
 
-    truth = mu_0 * M / 2 * (cosine(upper) - cosine(lower))
-    slope = mu_0 * M / 2 * RADIUS**2 * (np.hypot(upper, RADIUS) ** -3 - np.hypot(lower, RADIUS) ** -3)
+    truth = MU_0 * M / 2 * (cosine(upper) - cosine(lower))
+    slope = MU_0 * M / 2 * RADIUS**2 * (np.hypot(upper, RADIUS) ** -3 - np.hypot(lower, RADIUS) ** -3)
     # The formulas, differences themselves, hold their last digits only in extended precision.
-    tolerance = 1e-13 + 10 * np.finfo(np.longdouble).eps * M * mu_0 / np.abs(truth)
+    tolerance = 1e-13 + 10 * np.finfo(np.longdouble).eps * M * MU_0 / np.abs(truth)
     assert np.all(np.abs(b[:, 2] / truth - 1) < tolerance)
-    np.testing.assert_allclose(gradient[:, 2, 2], slope.astype(float), rtol=1e-9, atol=1e-16 * M * mu_0 / RADIUS)
+    np.testing.assert_allclose(gradient[:, 2, 2], slope.astype(float), rtol=1e-9, atol=1e-16 * M * MU_0 / RADIUS)
     assert np.all(b[:, :2] == 0)
 
 
@@ -166,7 +166,7 @@ def test_no_flux_leaves_a_surface_that_cuts_the_magnet(direction):
     for z, sign in ((low, -1), (high, 1)):
         normal = field(rho, np.array(z))[..., 2].mean(axis=-1)
         fluxes.append(sign * np.pi * r * (weights @ (normal * rho[:, 0])))
-    assert np.abs(fluxes).max() > 1e-3 * mu_0 * M * RADIUS**2
+    assert np.abs(fluxes).max() > 1e-3 * MU_0 * M * RADIUS**2
     assert abs(sum(fluxes)) < 1e-12 * np.abs(fluxes).max()
 
 
@@ -181,7 +181,7 @@ def test_far_field_is_the_dipole(aspect):
     scale = np.hypot(RADIUS, length / 2)
 
     def deviation(distance: float) -> float:
-        dipole = mu_0 / (4 * np.pi * distance**3) * (3 * rays * (rays @ moment)[:, None] - moment)
+        dipole = MU_0 / (4 * np.pi * distance**3) * (3 * rays * (rays @ moment)[:, None] - moment)
         (b,) = cylinder_jet(distance * rays, RADIUS, length, m, order=0)
         return float(np.max(relative(b, dipole, 1)))
 
@@ -204,7 +204,7 @@ def test_normal_B_and_tangential_H_are_continuous(direction):
         inner, outer = (
             cylinder_jet(points + side * step * RADIUS * normal, RADIUS, length, m, order=0)[0] for side in (-1, 1)
         )
-        jump = (outer - inner) / mu_0
+        jump = (outer - inner) / MU_0
         # B_n does not jump, H_t neither: B jumps by the tangential part of the magnetisation that ends.
         tangential = m - normal * (normal @ m)[:, None]
         np.testing.assert_allclose(jump, -tangential, atol=1e-8 * M)
@@ -275,3 +275,9 @@ def test_shapes_broadcast():
         assert b.shape == (*shape, 3)
         assert gradient.shape == (*shape, 3, 3)
         assert hessian.shape == (*shape, 3, 3, 3)
+
+
+def test_vacuum_permeability_is_that_of_the_devices():
+    """Across the wall of an axially magnetised cylinder B jumps by µ₀ M."""
+    inside, outside = cylinder_jet([[1 - 1e-12, 0, 0], [1 + 1e-12, 0, 0]], 1.0, 2.0, [0, 0, 1 / MU_0], 0)[0]
+    assert inside[2] - outside[2] == pytest.approx(1, abs=1e-10)
