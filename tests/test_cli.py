@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 import magfem
-from magfem.cli import main
+from magfem.cli import main, points
 from magfem.cli.program import command_line
 
 CHECKOUT = Path(__file__).parents[1]
@@ -145,7 +145,9 @@ def test_fit_takes_a_recipe_of_the_users_own(tmp_path: Path) -> None:
 
 def test_validate_keeps_the_bound_or_returns_one(fitted: tuple[Path, str], tmp_path: Path) -> None:
     model, _ = fitted
-    assert run_json("validate", model, cwd=tmp_path)["passed"]
+    result = run_json("validate", model, cwd=tmp_path)
+    assert result["passed"]
+    assert result["reference"] == "finite elements at twice the resolution (dimension 2, resolution 2)"
     content = json.loads(model.read_text())
     content["report"]["bound"]["B"] = 1e-9
     (tmp_path / "boast.json").write_text(json.dumps(content))
@@ -344,6 +346,19 @@ def test_malformed_points_name_file_line_and_column(
     assert not Path("f.csv").exists()
 
 
+def test_points_that_may_not_be_read_are_bad_input(
+    here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Root may read everything: the refusal is played by the call itself."""
+
+    def refused(*_: object, **__: object) -> str:
+        raise PermissionError(13, "Permission denied", "p.csv")
+
+    monkeypatch.setattr(points.Path, "read_text", refused)
+    line = error_line(capsys, "field", RING, "--points", "p.csv", "-o", "f.csv")
+    assert "cannot be read: Permission denied [p.csv]" in line
+
+
 def test_bad_input_from_a_shell(tmp_path: Path) -> None:
     out, err = run("solve", "rotor", cwd=tmp_path, code=2)
     assert out == "" and err.count("\n") == 1 and 'the nearest is "rotor_1x3"' in err
@@ -362,7 +377,7 @@ def test_a_tolerance_out_of_reach_is_three(capsys: pytest.CaptureFixture[str], m
     [
         (MemoryError(), 3, "out of memory: lower the resolution"),
         (ZeroDivisionError("a\nb"), 3, "ZeroDivisionError: a\\nb: this is a bug in magfem"),
-        (OSError(28, "No space left on device", "x.vtu"), 3, "No space left on device [x.vtu]"),
+        (OSError(28, "No space left on device", "x.vtu"), 2, "No space left on device [x.vtu]"),
         (ModuleNotFoundError("no", name="h5py"), 2, "the Python package h5py is missing: pip install h5py"),
     ],
 )

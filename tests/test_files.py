@@ -181,7 +181,7 @@ def test_file_put_there_while_filling_is_left_alone(tmp_path):
     def slow(folder):
         (tmp_path / "run" / "thesis.tex").write_text("old")
 
-    with pytest.raises(InputError, match="thesis.tex"):
+    with pytest.raises(InputError, match=r"thesis\.tex"):
         write_folder(tmp_path / "run", slow, OWNED)
     assert entries(tmp_path) == {"run"} and entries(tmp_path / "run") == {"thesis.tex"}
 

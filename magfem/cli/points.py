@@ -55,6 +55,8 @@ def _text(path: Path) -> str:
         raise InputError(f"expected a CSV file, got a directory [{path}]") from None
     except UnicodeDecodeError:
         raise InputError(f"not UTF-8 text [{path}]") from None
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror or error} [{path}]") from None
 
 
 def _column(path: Path, header: Sequence[str], axis: str) -> tuple[int, float]:

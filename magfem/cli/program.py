@@ -75,7 +75,7 @@ def _explain(error: BaseException) -> int:
         message, code = f"error: the Python package {error.name} is missing: pip install {error.name}", 2
     elif isinstance(error, OSError):
         place = f" [{error.filename}]" if error.filename else ""
-        message, code = f"error: {error.strerror or error}{place}", 3
+        message, code = f"error: {error.strerror or error}{place}", 2
     else:
         message = f"error: {type(error).__name__}: {error}: this is a bug in magfem (--debug shows where)"
         code = 3

@@ -23,8 +23,9 @@ def add(commands: CommandLine) -> None:
         "check a model's own error statement; exit code 1 when it is exceeded",
         "Compares a field model with a reference at random points of its region, none of them fitted, and\n"
         "checks that the errors stay within the bound that the model states. The reference is by default its\n"
-        "device, solved again by finite elements; or the closed form (`exact`, which holds for recoil\n"
-        "permeability 1), or another model.",
+        "device, solved anew by finite elements at twice the resolution, which tests the model's own finite\n"
+        "elements as well as its fit; or the closed form (`exact`, which holds for recoil permeability 1), or\n"
+        "another model.",
         [
             "magfem validate ring.json",
             "magfem validate ring.json --against exact",
@@ -32,7 +33,9 @@ def add(commands: CommandLine) -> None:
         ],
     )
     parser.add_argument("model", metavar="MODEL", help="field model: a name or a path")
-    parser.add_argument("--against", default="fem", metavar="exact|fem|MODEL", help="the reference (default: fem)")
+    parser.add_argument(
+        "--against", default="fem", metavar="exact|fem|MODEL", help="the reference (default: fem, twice as fine)"
+    )
 
 
 def run(options: Namespace) -> int:
@@ -55,12 +58,18 @@ def _reference(model: FieldModel, shown: str, against: str) -> tuple[Field, str]
     geometry = _device(model, shown)
     if against == "exact":
         return _closed_form(geometry), "the closed form"
-    from magfem.fem import solve
+    from magfem.fem.solve import RESOLUTIONS, check_resolution, choose_dimension, solve
 
-    solver = model.provenance.get("solver") or {"dimension": None, "resolution": 1.0}
-    solution = solve(geometry, solver["dimension"], solver["resolution"])
-    dimension, resolution = solution.settings["dimension"], solution.settings["resolution"]
-    return solution, f"finite elements, dimension {dimension}, resolution {resolution:g}"
+    solver = model.provenance.get("solver") or {}
+    if not isinstance(solver, dict):
+        raise CardError("expected the settings of the model's solver", f"{shown}: provenance.solver")
+    dimension = choose_dimension(geometry, solver.get("dimension"))
+    own = solver.get("resolution", 1.0)
+    check_resolution(own, dimension)
+    resolution = min(2 * own, RESOLUTIONS[dimension][1])
+    finer = "twice the" if resolution == 2 * own else f"{resolution / own:g} times the"
+    name = f"finite elements at {finer} resolution (dimension {dimension}, resolution {resolution:g})"
+    return solve(geometry, dimension, resolution), name
 
 
 def _device(model: FieldModel, shown: str) -> Geometry:
