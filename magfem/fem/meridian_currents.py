@@ -22,7 +22,7 @@ from magfem.threads import in_chunks
 from magfem.typing import Floats, Jet, Points
 
 _GAUSS = np.polynomial.legendre.leggauss(8)
-_NEAR = 0.8
+_NEAR = 1.5
 """Shortest distance, in lengths of the piece, at which one Gauss rule integrates it; below, it is halved."""
 _DEEPEST = 48
 

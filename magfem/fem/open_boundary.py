@@ -21,6 +21,7 @@ from scipy.special import eval_legendre
 from magfem.compiled import kernel
 from magfem.fields.solid_harmonics import Complexes, fill_table, schmidt_scale
 from magfem.mesh.mesh import Mesh
+from magfem.mesh.shape_functions import triangle_rule, triangle_shapes
 from magfem.typing import Floats, Integers, Points
 
 DEGREE = 18
@@ -129,28 +130,14 @@ def half_circle(
 
 def _sphere_rule(mesh: Mesh) -> tuple[Floats, Floats, Floats]:
     """Points (f, q, 3), solid-angle weights (f, q) and shape functions (q, 6) on the outer facets."""
-    from skfem.quadrature import get_quadrature
-    from skfem.refdom import RefTri
-
-    local, w = get_quadrature(RefTri, 8)
-    shapes, du, dv = triangle_shapes(local.T)
+    local, w = triangle_rule(8)
+    shapes, du, dv = triangle_shapes(local)
     nodes = mesh.points[mesh.outer_facets]
     points = np.einsum("qa,fai->fqi", shapes, nodes)
     normal = np.cross(np.einsum("qa,fai->fqi", du, nodes), np.einsum("qa,fai->fqi", dv, nodes))
     # dΩ = n·x/|x|³ dS is the true solid angle whatever the facet's shape.
     angle = np.einsum("fqi,fqi->fq", normal, points) / np.linalg.norm(points, axis=-1) ** 3
     return points, angle * w, shapes
-
-
-def triangle_shapes(points: Floats) -> tuple[Floats, Floats, Floats]:
-    """Six quadratic shape functions (q, 6) on the unit triangle at (q, 2), and their two derivatives."""
-    u, v = points[:, 0], points[:, 1]
-    w = 1 - u - v
-    zero = np.zeros_like(u)
-    values = np.stack([w * (2 * w - 1), u * (2 * u - 1), v * (2 * v - 1), 4 * u * w, 4 * u * v, 4 * v * w], axis=1)
-    du = np.stack([1 - 4 * w, 4 * u - 1, zero, 4 * (w - u), 4 * v, -4 * v], axis=1)
-    dv = np.stack([1 - 4 * w, zero, 4 * v - 1, -4 * u, 4 * u, 4 * (w - v)], axis=1)
-    return values, du, dv
 
 
 def _collect(

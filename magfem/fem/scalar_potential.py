@@ -13,9 +13,10 @@ from magfem.constants import MU_0
 from magfem.fem.discrete import Discrete
 from magfem.fem.linear_solver import solve_open, two_level
 from magfem.fem.open_boundary import sphere
-from magfem.fem.stiffness import assemble, shape_gradients
+from magfem.fem.stiffness import assemble
 from magfem.fem.surface_currents import SurfaceCurrents
 from magfem.mesh.mesh import Mesh
+from magfem.mesh.shape_functions import shape_gradients
 from magfem.typing import Floats
 
 

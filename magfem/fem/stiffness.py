@@ -6,7 +6,6 @@ assembly to rounding in the tests: element by element it does the same sums, man
 
 from __future__ import annotations
 
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from scipy.sparse import coo_matrix, csr_matrix
 from magfem.compiled import kernel
 from magfem.errors import MeshError
 from magfem.mesh.mesh import Mesh
+from magfem.mesh.shape_functions import shape_gradients, tetrahedron_rule
 from magfem.typing import Floats, Integers
 
 _CURVED_ORDER = 5  # quadrature degree on curved elements; straight ones are integrated exactly by degree 2
@@ -72,28 +72,6 @@ def assemble(mesh: Mesh, permeability: Floats, magnetisation: Floats) -> tuple[c
     matrix = coo_matrix((stiffness.ravel(), (rows, columns)), shape=(n, n)).tocsr()
     total: Floats = np.bincount(mesh.cells.ravel(), load.ravel(), minlength=n).astype(float)
     return matrix, total, volume
-
-
-@cache
-def tetrahedron_rule(order: int) -> tuple[Floats, Floats]:
-    """Quadrature points (q, 3) and weights (q,) on the unit tetrahedron, exact to degree `order`."""
-    from skfem.quadrature import get_quadrature
-    from skfem.refdom import RefTet
-
-    points, weights = get_quadrature(RefTet, order)
-    return np.ascontiguousarray(points.T), np.ascontiguousarray(weights)
-
-
-def shape_gradients(points: Floats) -> Floats:
-    """Gradients (q, 10, 3) of the ten quadratic shape functions at reference points (q, 3)."""
-    first = 1.0 - points.sum(axis=1)
-    barycentric = np.column_stack([first, points])
-    slope = np.array([[-1.0, -1.0, -1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
-    gradients = np.empty((points.shape[0], 10, 3))
-    gradients[:, :4] = (4.0 * barycentric[:, :, None] - 1.0) * slope
-    for n, (i, j) in enumerate(((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))):
-        gradients[:, 4 + n] = 4.0 * (barycentric[:, i, None] * slope[j] + barycentric[:, j, None] * slope[i])
-    return gradients
 
 
 def _straight(mesh: Mesh) -> Any:

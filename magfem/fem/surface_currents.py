@@ -13,13 +13,12 @@ inside the magnet as well, with the accuracy of an integrated (not a differentia
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 
 from magfem.compiled import kernel, summing_kernel
 from magfem.constants import MU_0
-from magfem.fem.open_boundary import triangle_shapes
+from magfem.mesh.shape_functions import triangle_rule, triangle_shapes
 from magfem.threads import in_chunks
 from magfem.typing import Floats, Jet, Points
 
@@ -50,7 +49,7 @@ class SurfaceCurrents:
         hessian = np.zeros((count if order > 1 else 0, 3, 3, 3))
         centre = self.nodes[:, :3].mean(axis=1)
         size = np.linalg.norm(self.nodes[:, :3] - centre[:, None], axis=-1).max(axis=1)
-        far, near = _rule(2), _rule(6)
+        far, near = triangle_rule(2), triangle_rule(6)
         places, strengths = self._elements(*near)
         # One row for each coordinate, points of the rule before triangles: the layout that vector units like.
         distant = np.concatenate([array.transpose(2, 1, 0) for array in self._elements(*far)]).copy()
@@ -92,19 +91,9 @@ class SurfaceCurrents:
     @property
     def moment(self) -> Floats:
         """Dipole moment (3,) A·m²: ½ ∮ x × K dS."""
-        places, strengths = self._elements(*_rule(8))
+        places, strengths = self._elements(*triangle_rule(8))
         total: Floats = 0.5 * np.cross(places, strengths).sum(axis=(0, 1))
         return total
-
-
-@cache
-def _rule(order: int) -> tuple[Floats, Floats]:
-    """Quadrature points (q, 2) and weights (q,) on the unit triangle, exact to degree `order`."""
-    from skfem.quadrature import get_quadrature
-    from skfem.refdom import RefTri
-
-    points, weights = get_quadrature(RefTri, order)
-    return np.ascontiguousarray(points.T), np.ascontiguousarray(weights)
 
 
 @kernel

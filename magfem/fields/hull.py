@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from magfem.errors import InputError
-from magfem.typing import Floats, Points
+from magfem.typing import Floats, Integers, Points
 
 
 class Hull(Protocol):
@@ -28,6 +28,14 @@ class Hull(Protocol):
         """Random points at given hull distances, uniform over each offset surface.
 
         `distance` (n,) m gives n surfaces; the result is (n, count, 3) m.
+        """
+        ...
+
+    def marked_points(self, distance: Floats, count: int, rng: np.random.Generator) -> Points:
+        """Points (n, count, 3) m at given hull distances that reach every part of each offset surface.
+
+        Walls, faces and rims get equal shares whatever their area, axes and edges among them: fields are
+        extreme there, and uniform points hardly ever meet them.
         """
         ...
 
@@ -51,23 +59,34 @@ class CylinderHull:
 
     def offset_points(self, distance: Floats, count: int, rng: np.random.Generator) -> Points:
         d = np.asarray(distance, dtype=float)[:, None]
-        radius, half = self.diameter / 2, self.length / 2
         shape = (d.shape[0], count)
         # The offset surface is the wall, two faces and, along the rims, two quarters of a torus.
+        radius = self.diameter / 2
         wall = 2 * np.pi * (radius + d) * self.length
         faces = 2 * np.pi * radius**2 * np.ones_like(d)
         rims = 4 * np.pi * (radius * np.pi / 2 * d + d**2)
         pick = rng.random(shape) * (wall + faces + rims)
-        u, side = rng.random(shape), np.where(rng.random(shape) < 0.5, -1.0, 1.0)
-        on_wall, on_face = pick < wall, (pick >= wall) & (pick < wall + faces)
-        polar = _torus_angle(u, radius, d)
-        rho = np.where(on_wall, radius + d, np.where(on_face, radius * np.sqrt(u), radius + d * np.sin(polar)))
-        z = np.where(
-            on_wall,
-            self.length * (u - 0.5),
-            np.where(on_face, side * (half + d), side * (half + d * np.cos(polar))),
-        )
-        azimuth = rng.uniform(0, 2 * np.pi, shape)
+        u = rng.random(shape)
+        part = np.where(pick < wall, 0, np.where(pick < wall + faces, 1, 2))
+        return self._on_part(d, part, np.where(part == 1, np.sqrt(u), u), _torus_angle(u, radius, d), rng)
+
+    def marked_points(self, distance: Floats, count: int, rng: np.random.Generator) -> Points:
+        d = np.asarray(distance, dtype=float)[:, None]
+        shape = (d.shape[0], count)
+        part = np.broadcast_to(np.arange(count) % 3, shape)
+        u = rng.random(shape)
+        # The first six go to the equator, the axis and four edges, near enough; no two draws meet exactly.
+        ends = np.array([0.5, 0.0, 0.0, 1.0, 1.0, 1.0])[:count]
+        u[:, :6] = np.abs(ends - 1e-4 * u[:, :6])
+        return self._on_part(d, part, u, u * (np.pi / 2), rng)
+
+    def _on_part(self, d: Floats, part: Integers, u: Floats, polar: Floats, rng: np.random.Generator) -> Points:
+        """Points (n, c, 3) on wall (0), face (1), rim (2): `u` in [0, 1] along the first two, `polar` along a rim."""
+        radius, half = self.diameter / 2, self.length / 2
+        side = np.where(rng.random(u.shape) < 0.5, -1.0, 1.0)
+        rho = np.choose(part, [radius + d + 0 * u, radius * u, radius + d * np.sin(polar)])
+        z = np.choose(part, [self.length * (u - 0.5), side * (half + d), side * (half + d * np.cos(polar))])
+        azimuth = rng.uniform(0, 2 * np.pi, u.shape)
         return np.stack([rho * np.cos(azimuth), rho * np.sin(azimuth), z], axis=-1)
 
 

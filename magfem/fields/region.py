@@ -59,7 +59,8 @@ class Shell:
         """Random points (layers, per_layer, 3) m; all points of a layer share one hull distance.
 
         Layers lie denser where the field is steeper: half of them are spread evenly over the distance and
-        half over its logarithm, one at random in each cell, and the two limits are always among them.
+        half over its logarithm, one at random in each cell, and the two limits are always among them. Half of
+        a layer's points are uniform over its surface, the others make sure of axes, edges, walls and faces.
         """
         even = layers // 2
         cells = (np.arange(even) + rng.random(even)) / even
@@ -73,7 +74,8 @@ class Shell:
         )
         distances = np.sort(distances)
         distances[0], distances[-1] = self.clearance, self.extent
-        return self.hull.offset_points(distances, per_layer, rng)
+        uniform = self.hull.offset_points(distances, per_layer - per_layer // 2, rng)
+        return np.concatenate([uniform, self.hull.marked_points(distances, per_layer // 2, rng)], axis=1)
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,9 @@ from magfem.fields.terms import Terms, concatenate, frame_about, harmonics, loop
 from magfem.geometry import Geometry
 from magfem.typing import ArrayLike, Booleans, Floats, Integers
 
+MOST_LOOPS = 120
+"""Loops on one wall: more would make a model slower than it is worth."""
+
 
 @dataclass(frozen=True)
 class Candidate:
@@ -65,15 +68,22 @@ def wall_and_face_loops(geometry: Geometry) -> Iterator[Candidate]:
     """Coaxial loops on a body of revolution: its bound currents in the places where they flow.
 
     Loops sit at Gauss–Legendre points along the walls (the currents of the remanence) and along the faces
-    (those of the reaction to it); the fit finds their currents.
+    (those of the reaction to it); the fit finds their currents. The first candidate has two loops for each
+    clearance along the wall (fewer for long ones), and each further one 1.4 times as many.
     """
     hull, inner = _revolved(geometry)
     if not geometry.axisymmetric:
         raise InputError(f"{geometry.name}: coaxial loops need axial magnetisation")
-    radii = [hull.diameter / 2] + ([inner] if inner > 0 else [])
-    for along_wall, along_face in ((4, 2), (6, 4), (8, 6), (12, 8), (16, 12)):
+    outer = hull.diameter / 2
+    radii = [outer] + ([inner] if inner > 0 else [])
+    clearance, width = geometry.region.clearance, outer - inner
+    density = min(2.0, 16 * clearance / max(hull.length, width))  # loops for each clearance along the wall
+    while (along_wall := max(2, round(density * hull.length / clearance))) <= MOST_LOOPS:
+        along_face = max(2, round(density * width / (1.8 * clearance)))
+        if along_face > MOST_LOOPS:
+            break
         z = _gauss(along_wall, -hull.length / 2, hull.length / 2)
-        rho = _gauss(along_face, inner, hull.diameter / 2)
+        rho = _gauss(along_face, inner, outer)
         walls = [(radius, height) for radius in radii for height in z]
         faces = [(radius, side * hull.length / 2) for side in (-1, 1) for radius in rho]
         radius, height = np.array(walls + faces).T
@@ -83,6 +93,7 @@ def wall_and_face_loops(geometry: Geometry) -> Iterator[Candidate]:
             f"{along_wall} loops on each wall, {along_face} on each face",
             loops(centre, radius, np.ones(height.size)),
         )
+        density *= 1.4
 
 
 def solid_harmonics(geometry: Geometry) -> Iterator[Candidate]:

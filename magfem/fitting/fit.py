@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from magfem.errors import InputError
+from magfem.errors import ConvergenceError, InputError
 from magfem.fem.solution import Solution, describe
 from magfem.fields.field import Field
 from magfem.fields.norms import relative_errors
@@ -67,11 +67,9 @@ def fit(source: Field, recipe: Recipe | None = None) -> FieldModel:
     and for a field that is not finite or vanishes.
     """
     recipe = recipe or Recipe()
-    geometry = recipe.geometry or getattr(source, "geometry", None)
-    if geometry is None:
-        raise InputError(
-            "cannot tell which device this field belongs to: fit(source, recipe) with a recipe that names it"
-        )
+    if not isinstance(recipe, Recipe):
+        raise InputError("fit takes a Recipe: magfem.fitting.load_recipe reads one from a file")
+    geometry = _device(source, recipe)
     region = geometry.region
     seeds = np.random.SeedSequence(recipe.seed).spawn(len(_SAMPLES))
     samples = {
@@ -119,11 +117,28 @@ def fit(source: Field, recipe: Recipe | None = None) -> FieldModel:
     )
 
 
+def _device(source: Field, recipe: Recipe) -> Geometry:
+    """The device that source and recipe speak of."""
+    if not isinstance(source, Field):
+        raise InputError("fit takes a field: a solution of magfem.solve, or any object with the Field interface")
+    own: Geometry | None = getattr(source, "geometry", None)
+    if own is None and recipe.geometry is None:
+        raise InputError(
+            "cannot tell which device this field belongs to: fit(source, recipe) with a recipe that names it"
+        )
+    if own is not None and recipe.geometry is not None and own != recipe.geometry:
+        raise InputError(f"the recipe is for {recipe.geometry.name}, but the field is that of {own.name}")
+    geometry = recipe.geometry or own
+    assert geometry is not None
+    return geometry
+
+
 def _sample(
     source: Field, region: Shell, rng: np.random.Generator, layers: int, per_layer: int, nearest: int
 ) -> Samples:
     spread = region.layers(rng, layers, per_layer)
-    points = np.concatenate([spread, region.hull.offset_points(np.full(nearest, region.clearance), per_layer, rng)])
+    closest = np.full(nearest, region.clearance)
+    points = np.concatenate([spread, region.hull.marked_points(closest, per_layer, rng)])
     B, gradient = source.jet(points, 1)
     if not (np.isfinite(B).all() and np.isfinite(gradient).all()):
         raise InputError("cannot fit this field: it holds values that are not finite in the device's region")
@@ -138,8 +153,8 @@ def _climb(geometry: Geometry, recipe: Recipe, samples: dict[str, Samples]) -> l
     tried: list[Fitted] = []
     for candidate in FAMILIES[family](geometry):
         solved = _solve(candidate, samples["training"])
-        if solved.condition > CONDITION and tried:
-            break
+        if solved.condition > CONDITION:
+            continue
         terms = candidate.with_parameters(solved.parameters)
         selection = _errors(terms.jet(samples["selection"].points.reshape(-1, 3), 1), samples["selection"])
         tried.append(Fitted(candidate, solved, selection))
@@ -149,8 +164,28 @@ def _climb(geometry: Geometry, recipe: Recipe, samples: dict[str, Samples]) -> l
 
 
 def _choose(tried: list[Fitted], recipe: Recipe) -> Fitted:
-    """The first candidate below half the targets, else the best."""
-    return min(tried, key=lambda one: _score(one, recipe))
+    """The first candidate below half the targets, else the best; says so when that misses them.
+
+    Raises ConvergenceError when even the best is no model: its error of B is above 100 %.
+    """
+    if not tried:
+        raise ConvergenceError(
+            f"no model of this device has a condition number up to {CONDITION:.0e}: its terms are too alike"
+        )
+    chosen = min(tried, key=lambda one: _score(one, recipe))
+    B, gradient = (chosen.selection[key]["max"] for key in ("B", "gradient"))
+    if not B < 1:
+        raise ConvergenceError(
+            f"no model of the family {chosen.candidate.family} describes this field: the best of {len(tried)} errs by "
+            f"{B:.1e} in B; a larger clearance in the card's region is what helps"
+        )
+    if _score(chosen, recipe) > 1:
+        log.warning(
+            "the targets are missed: %.1e in B (wanted %.1e), %.1e in the gradient (wanted %.1e); "
+            "the stated bound says how good the model is, a larger clearance makes it better",
+            *(B, recipe.target_B, gradient, recipe.target_gradient),
+        )
+    return chosen
 
 
 def _score(fitted: Fitted, recipe: Recipe) -> float:

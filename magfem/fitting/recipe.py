@@ -36,6 +36,8 @@ class Recipe:
         for key in _RULES:
             if complaint := _complaint(key, getattr(self, key)):
                 raise InputError(f"{complaint}, got {getattr(self, key)!r}")
+        if self.family and self.geometry:
+            next(FAMILIES[self.family](self.geometry))  # refuses a device that the family is not made for
 
 
 def load_recipe(name_or_path: str | Path) -> Recipe:

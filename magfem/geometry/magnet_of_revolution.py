@@ -46,7 +46,7 @@ class MagnetOfRevolution(ABC):
     source: str = ""  # where the numbers come from
     clearance: float | None = None  # m, smallest hull distance of interest; None: see `region`
     extent: float | None = None  # m, largest hull distance of interest; None: see `region`
-    origin: CardOrigin | None = field(default=None, compare=False)  # None when made in Python
+    origin: CardOrigin | None = field(default=None, compare=False, repr=False)  # None when made in Python
 
     def __post_init__(self) -> None:
         if not isinstance(self.material, PermanentMagnet):
@@ -127,11 +127,17 @@ class MagnetOfRevolution(ABC):
     def region(self) -> Shell:
         """Where a model of this magnet must hold.
 
-        Unless stated, the clearance is 1/8 of the outer diameter and the extent 1.5 times the largest
-        dimension, both rounded to two digits: 0.5 mm to 6 mm for a ring of 4 mm.
+        Unless stated, the extent is 1.5 times the largest dimension, and the clearance 1/8 of the outer
+        diameter or 1/16 of the length, whichever is larger (0.5 mm to 6 mm for a ring of 4 mm): nearer, a model
+        of few terms cannot follow the field. Other than axial magnetisation is modelled by multipoles about the
+        centre, which want the region to begin at 1.5 times the radius of the ball around the magnet. Both are
+        rounded to two digits.
         """
         tube = self.tube
-        clearance = _two_digits(tube.outer_diameter / 8) if self.clearance is None else self.clearance
+        nearest = max(tube.outer_diameter / 8, tube.length / 16)
+        if not self.axisymmetric:
+            nearest = max(nearest, 1.5 * self.hull.radius - min(tube.outer_diameter, tube.length) / 2)
+        clearance = _two_digits(nearest) if self.clearance is None else self.clearance
         extent = _two_digits(1.5 * max(tube.outer_diameter, tube.length)) if self.extent is None else self.extent
         return Shell(self.hull, clearance, extent)
 

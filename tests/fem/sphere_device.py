@@ -27,6 +27,13 @@ class Sphere:
     def build(self, occ: Any) -> dict[str, list[int]]:
         return {"magnet": [occ.addSphere(*self.offset, 1.0)]}
 
+    def build_meridian(self, occ: Any) -> dict[str, list[int]]:
+        x, _, z = self.offset
+        south, east, north = (occ.addPoint(x + a, z + b, 0) for a, b in ((0, -1), (1, 0), (0, 1)))
+        centre = occ.addPoint(x, z, 0)
+        arcs = [occ.addCircleArc(south, centre, east), occ.addCircleArc(east, centre, north), occ.addLine(north, south)]
+        return {"magnet": [occ.addPlaneSurface([occ.addCurveLoop(arcs)])]}
+
     @property
     def moment(self) -> float:
         """M = M₀ + (µ − 1)H with H = −M/3 inside: M = 3M₀/(µ + 2)."""

@@ -7,9 +7,9 @@ import pytest
 from fem.sphere_device import Sphere
 
 from magfem.fem import scalar_potential
-from magfem.fem.stiffness import tetrahedron_rule
 from magfem.mesh import generate as generation
 from magfem.mesh.generate import Sizes, generate
+from magfem.mesh.shape_functions import tetrahedron_rule
 
 
 def solve(sphere, size, monkeypatch, ball=1.35):

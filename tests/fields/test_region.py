@@ -175,3 +175,16 @@ def test_unknown_kinds_are_refused() -> None:
         hull_from_dict({"kind": "cone"})
     with pytest.raises(InputError, match="unknown region kind None; known: everywhere, shell"):
         region_from_dict({})
+
+
+def test_layers_meet_axis_edges_and_every_part() -> None:
+    """What uniform points hardly ever meet: the axis, the equator, the ends of wall and face, at every distance."""
+    layers = SHELL.layers(np.random.default_rng(0), 16, 24)
+    hull = SHELL.hull
+    rho, z = np.hypot(layers[..., 0], layers[..., 1]), np.abs(layers[..., 2])
+    distance = hull.distance(layers)
+    assert np.allclose(distance, distance[:, :1], atol=1e-12)
+    assert np.all(rho.min(axis=1) <= 1e-3 * hull.diameter)
+    assert np.all(z.min(axis=1) <= 1e-3 * hull.length)
+    for on_part in (z <= hull.length / 2, rho <= hull.diameter / 2):
+        assert np.all(on_part.sum(axis=1) >= 4)

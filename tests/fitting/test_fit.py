@@ -269,7 +269,7 @@ def test_coefficients_scatter_as_the_covariance_says(rotor):
 
 def test_covariance_goes_with_the_square_of_the_noise(rotor):
     weak, strong = noisy_fit(rotor, 1e-4, 1), noisy_fit(rotor, 1e-3, 1)
-    np.testing.assert_allclose(strong.covariance, 100 * weak.covariance, rtol=1e-3, atol=1e-6 * strong.covariance.max())
+    np.testing.assert_allclose(strong.covariance, 100 * weak.covariance, rtol=5e-3, atol=1e-6 * strong.covariance.max())
 
 
 def test_least_squares_matches_the_normal_equations():

@@ -86,7 +86,7 @@ def test_only_axial_magnets_are_axisymmetric(direction: tuple[float, float, floa
 
 def test_default_region_follows_the_size() -> None:
     assert (RING.region.clearance, RING.region.extent) == (0.5e-3, 6e-3)
-    assert CYLINDER.region.clearance == pytest.approx(0.125e-3, rel=0.05)
+    assert CYLINDER.region.clearance == pytest.approx(CYLINDER.length / 16, rel=0.05)
     assert CYLINDER.region.extent == 4.5e-3
     assert replace(RING, extent=9e-3).region.extent == 9e-3
 
