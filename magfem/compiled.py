@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import logging
 import os
+import stat
 import tempfile
 from collections.abc import Callable
 from functools import cache
@@ -40,9 +41,10 @@ def summing_kernel(function: Function) -> Function:
 def _compile(function: Function, fastmath: Any) -> Function:
     folder = _cache_folder()
     config: Any = numba.config
-    previous, config.CACHE_DIR = config.CACHE_DIR, str(folder)
+    previous, config.CACHE_DIR = config.CACHE_DIR, str(folder or "")
     try:
-        compiled: Any = numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=fastmath)(function)
+        jit: Any = numba.njit(cache=folder is not None, nogil=True, error_model="numpy", fastmath=fastmath)
+        compiled = jit(function)
     finally:
         config.CACHE_DIR = previous
     return cast(Function, compiled)
@@ -67,20 +69,37 @@ event.register("numba:compile", _Announcement())  # type: ignore[no-untyped-call
 
 
 @cache
-def _cache_folder() -> Path:
+def _cache_folder() -> Path | None:
+    """Where compiled kernels are kept; None when no place can be written that nobody else may write to."""
     package = Path(__file__).parent
     digest = hashlib.sha256(numba.__version__.encode())
     for source in sorted(package.rglob("*.py")):
         text = source.read_bytes()
         if b"magfem.compiled import" in text:
             digest.update(text)
-    base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    for parent in (Path(base), Path(tempfile.gettempdir())):
-        folder = parent / "magfem" / digest.hexdigest()[:16]
+    for place in (_users_folder, _temporary_folder):
         try:
+            folder = place() / digest.hexdigest()[:16]
             folder.mkdir(parents=True, exist_ok=True)
-        except OSError:
+        except (OSError, RuntimeError):  # RuntimeError: a user without a home
             continue
         if os.access(folder, os.W_OK):
             return folder
+    log.warning("no folder can be written to keep compiled kernels in: they are compiled anew in every process")
+    return None
+
+
+def _users_folder() -> Path:
+    base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME")
+    return (Path(base) if base else Path.home() / ".cache") / "magfem"
+
+
+def _temporary_folder() -> Path:
+    """A folder of this user alone: machine code that others could write must not be run."""
+    user = os.getuid() if hasattr(os, "getuid") else 0
+    folder = Path(tempfile.gettempdir()) / f"magfem-{user}"
+    folder.mkdir(mode=0o700, exist_ok=True)
+    found = folder.lstat()
+    if hasattr(os, "getuid") and (found.st_uid != user or stat.S_IMODE(found.st_mode) != 0o700 or folder.is_symlink()):
+        raise PermissionError(f"not a private folder [{folder}]")
     return folder
