@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from functools import cached_property, reduce
+from operator import add
 from typing import TYPE_CHECKING, Literal, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
@@ -13,6 +15,9 @@ from scipy.spatial.transform import RigidTransform
 from magfem.errors import InputError, OutsideRegionError, UnitMismatchError
 from magfem.fields.region import Intersection, PlacedRegion, Region
 from magfem.typing import ArrayLike, Booleans, Hessians, Jet, Outside, Points, Tensors, Vectors
+
+if TYPE_CHECKING:
+    from magfem.fields.terms import Terms
 
 Unit: TypeAlias = Literal["T", "T/A"]
 
@@ -134,7 +139,14 @@ class Placed(Evaluated):
     def scalable(self) -> bool:
         return _scalable(self.field)
 
+    @cached_property
+    def lowered(self) -> Terms | None:
+        terms = _lowered(self.field)
+        return None if terms is None else terms.placed(self.pose)
+
     def evaluate(self, points: Points, order: int) -> Jet:
+        if self.lowered is not None:
+            return self.lowered.jet(points, order)
         rotation = self.pose.rotation.as_matrix()
         jet = self.field.jet(self.pose.inv().apply(points), order, outside="extrapolate")
         turned = ["ia,na->ni", "ia,jb,nab->nij", "ia,jb,kc,nabc->nijk"]
@@ -171,7 +183,14 @@ class Scaled(Evaluated):
     def region(self) -> Region:
         return self.field.region
 
+    @cached_property
+    def lowered(self) -> Terms | None:
+        terms = _lowered(self.field)
+        return None if terms is None else terms.scaled(self.factor)
+
     def evaluate(self, points: Points, order: int) -> Jet:
+        if self.lowered is not None:
+            return self.lowered.jet(points, order)
         jet = self.field.jet(points, order, outside="extrapolate")
         return tuple(self.factor * part for part in jet)
 
@@ -203,7 +222,15 @@ class Summed(Evaluated):
     def scalable(self) -> bool:
         return all(_scalable(field) for field in self.fields)
 
+    @cached_property
+    def lowered(self) -> Terms | None:
+        parts = [_lowered(field) for field in self.fields]
+        terms = [part for part in parts if part is not None]
+        return reduce(add, terms) if len(terms) == len(parts) else None
+
     def evaluate(self, points: Points, order: int) -> Jet:
+        if self.lowered is not None:
+            return self.lowered.jet(points, order)
         jets = [field.jet(points, order, outside="extrapolate") for field in self.fields]
         return tuple(np.sum(parts, axis=0) for parts in zip(*jets, strict=True))
 
@@ -244,3 +271,9 @@ def promised_points(points: Points, region: Region, outside: Outside) -> Boolean
 
 def _scalable(field: Field) -> bool:
     return bool(getattr(field, "scalable", True))
+
+
+def _lowered(field: Field) -> Terms | None:
+    """The field's terms, one flat array that one compiled call evaluates; None for fields that have none."""
+    terms: Terms | None = getattr(field, "lowered", None)
+    return terms

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from magfem import __version__
 from magfem.errors import ConvergenceError, InputError
 from magfem.fem.solution import Solution, describe
 from magfem.fields.field import Field
@@ -287,7 +288,7 @@ def _provenance(source: Field, geometry: Geometry) -> dict[str, Any]:
         "solution": solution and {"error": solution.error, "quantities": solution.quantities, "stats": solution.stats},
         "versions": {
             "python": platform.python_version(),
-            "magfem": _version("magfem"),
+            "magfem": __version__,
             **{package: _version(package) for package in packages},
         },
         "date": datetime.datetime.now(datetime.UTC).date().isoformat(),

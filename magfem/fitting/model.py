@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -16,14 +17,14 @@ from magfem.fields.terms import HARMONIC, LOOP, Terms, concatenate, frame_about,
 from magfem.files import read_json, write_json
 from magfem.geometry.catalogue import resolve, short_path
 from magfem.typing import Floats, Integers, Jet, Points
-from magfem.units import one_line
+from magfem.units import describe, one_line
 
 FORMAT, VERSION = "magfem-model", 1
 HIGHEST_DEGREE = 85
 """Of harmonics in a file; factorials of twice this still fit a float."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class FieldModel(Evaluated):
     """A fitted field; a Field in T.
 
@@ -41,6 +42,13 @@ class FieldModel(Evaluated):
     report: dict[str, Any]
     provenance: dict[str, Any]
     unit: Unit = "T"
+
+    def __repr__(self) -> str:
+        bound, label = self.report["bound"], self.report.get("label", f"{self.lowered.kind.size} sources")
+        return (
+            f"<FieldModel {self.name!r}: {label}, {self.region.describe()}, "
+            f"bound {bound['B']:.1e} in B, {bound['gradient']:.1e} in the gradient>"
+        )
 
     def evaluate(self, points: Points, order: int) -> Jet:
         return self.lowered.jet(points, order)
@@ -80,6 +88,8 @@ def load_model(name_or_path: str | Path) -> FieldModel:
 
     Raises InputError when there is none, CardError (file and key) when the file is not a whole model.
     """
+    if not isinstance(name_or_path, str | os.PathLike):
+        raise InputError(f'load_model takes a name or path: "ring.json", got {describe(name_or_path)}')
     where = ("fits", name_or_path, ".json")
     path, shown = resolve(*where), short_path(*where)
     data = read_json(path, "the field model")

@@ -418,3 +418,28 @@ def test_only_fields_are_added(model, other):
 def test_a_sum_of_nothing_is_refused():
     with pytest.raises(InputError, match="at least one field"):
         Summed(())
+
+
+def test_composed_models_lower_to_one_array_of_terms():
+    """Placed, scaled and summed models are one flat array: the same field as term by term, by another route."""
+    from magfem.fields.terms import loops
+
+    class Loop(Evaluated):
+        region, unit = Everywhere(), "T"
+        lowered = loops([[0, 0, 0]], [1e-3], [5.0])
+
+        def evaluate(self, points, order):
+            return self.lowered.jet(points, order)
+
+    class Opaque(Loop):
+        lowered = None
+
+        def evaluate(self, points, order):
+            return Loop.lowered.jet(points, order)
+
+    pose = RigidTransform.from_components([1e-3, 2e-3, 0], Rotation.from_euler("xyz", [0.3, 0.5, 0.7]))
+    composed, opaque = (kind().at(pose) * 2.0 + kind() - 0.5 * kind().at(pose) for kind in (Loop, Opaque))
+    assert composed.lowered.kind.size == 3 and opaque.lowered is None
+    points = np.random.default_rng(0).normal(size=(50, 3)) * 5e-3
+    for one, other in zip(composed.jet(points, 2), opaque.jet(points, 2), strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-12 * np.abs(other).max())

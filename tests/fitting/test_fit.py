@@ -183,7 +183,7 @@ class Disturbed(Source):
 
 
 def test_held_out_data_choose_and_fit_nothing(rotor_field, rotor_model):
-    """Spoilt held-out data, asked for last, spoil the stated errors and nothing else; spoilt training data the terms."""
+    """Spoilt held-out data, asked for last, spoil the stated errors and nothing else."""
     source = Disturbed(rotor_field, 2, 0.1)
     model = magfem.fit(source)
     assert len(source.asked) == 3
