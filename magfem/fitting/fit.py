@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from magfem import __version__
 from magfem.errors import ConvergenceError, InputError
 from magfem.fem.solution import Solution, describe
 from magfem.fields.field import Field
@@ -24,6 +23,7 @@ from magfem.fitting.model import FieldModel, terms_to_list
 from magfem.fitting.recipe import Recipe
 from magfem.geometry import Geometry
 from magfem.typing import Booleans, Floats, Points
+from magfem.version import __version__
 
 log = logging.getLogger("magfem")
 
