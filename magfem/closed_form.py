@@ -10,17 +10,20 @@ from magfem.errors import InputError
 from magfem.fields.field import Evaluated, Unit
 from magfem.fields.region import Everywhere, Region
 from magfem.fields.uniform_cylinder import cylinder_jet, ring_jet
-from magfem.geometry import CylinderMagnet, Geometry, RingMagnet
+from magfem.geometry import CylinderMagnet, Geometry, RingMagnet, check_device
 from magfem.typing import Floats, Jet, Points
 
 log = logging.getLogger("magfem")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class ExactField(Evaluated):
     """The field of a uniformly magnetised ring or cylinder, everywhere, inside the magnet too, in T."""
 
     geometry: RingMagnet | CylinderMagnet
+
+    def __repr__(self) -> str:
+        return f"<ExactField of {self.geometry.name!r}: the closed form at recoil permeability 1, everywhere>"
 
     @property
     def region(self) -> Region:
@@ -55,8 +58,9 @@ def exact(geometry: Geometry) -> ExactField:
 
     That is the device at recoil permeability 1, whatever its card says: a magnet with a higher one
     demagnetises itself (a few percent at 1.05), which only `solve` gives; a warning is logged then.
-    Raises InputError when no closed form is known.
+    Raises InputError when no closed form is known, or for what is no device.
     """
+    check_device(geometry, "exact")
     if not isinstance(geometry, (RingMagnet, CylinderMagnet)):
         raise InputError(f"no closed form is known for a {geometry.kind}: solve it instead")
     if geometry.material.recoil_permeability != 1.0:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import os
+import zipfile
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from magfem.errors import InputError
+from magfem.errors import CardError, InputError
 from magfem.fem.discrete import Currents
 from magfem.fem.meridian_currents import MeridianCurrents
 from magfem.fem.surface_currents import SurfaceCurrents
@@ -19,6 +22,8 @@ from magfem.geometry import Geometry, describe, geometry_from_text
 from magfem.mesh.export import write_mesh
 from magfem.mesh.mesh import Mesh
 from magfem.typing import Floats, Jet, Points
+from magfem.units import describe as words
+from magfem.units import one_line
 
 __all__ = ["FILES", "Solution", "describe", "load_solution"]
 
@@ -26,7 +31,7 @@ FILES = frozenset({"solution.vtu", "fields.npz", "summary.json"})
 """What a saved solution consists of."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Solution(Evaluated):
     """The finite-element solution of a device; a Field in T, inside the bodies too.
 
@@ -44,6 +49,13 @@ class Solution(Evaluated):
     quantities: dict[str, Any]
     stats: dict[str, Any]
     settings: dict[str, Any]
+
+    def __repr__(self) -> str:
+        return (
+            f"<Solution of {self.geometry.name!r}: dimension {self.settings['dimension']}, resolution "
+            f"{self.settings['resolution']:g}, stated error {self.error['B']:.1e} in B, "
+            f"{self.error['gradient']:.1e} in the gradient>"
+        )
 
     @property
     def region(self) -> Region:
@@ -104,21 +116,43 @@ class Solution(Evaluated):
 
 
 def load_solution(folder: str | Path) -> Solution:
-    """Read back what `Solution.save` wrote; InputError when the folder is not a saved solution."""
+    """Read back what `Solution.save` wrote.
+
+    Raises InputError when the folder is not a saved solution, CardError (file and reason) when it is not whole.
+    """
+    if not isinstance(folder, str | os.PathLike):
+        raise InputError(f'load_solution takes the folder of a solution: "runs/ring", got {words(folder)}')
     folder = Path(folder)
     summary = read_json(folder / "summary.json", "a solution's summary.json")
     if not isinstance(summary, dict) or summary.get("format") != "magfem-solution":
         raise InputError(f"this folder holds no saved solution [{folder}]")
     try:
-        with np.load(folder / "fields.npz") as stored:
+        with open(folder / "fields.npz", "rb") as file, np.load(file) as stored:
             arrays = dict(stored)
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
         raise InputError(f"the solution's fields cannot be read: {error} [{folder / 'fields.npz'}]") from None
+    try:
+        return _solution(summary, arrays)
+    except CardError:
+        raise
+    except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
+        reason = f"missing key {error}" if isinstance(error, KeyError) else one_line(str(error))
+        raise CardError(f"not a whole solution: {reason}", str(folder)) from None
+
+
+def _solution(summary: dict[str, Any], arrays: dict[str, Any]) -> Solution:
+    """From the content of summary.json and fields.npz; KeyError, TypeError, ValueError … when they are not whole."""
+    dimension, width = summary["settings"]["dimension"], arrays["points"].shape[1]
+    if dimension != width:
+        raise ValueError(f"settings.dimension is {words(dimension)}, its mesh has dimension {width}")
+    for value in (summary["settings"]["resolution"], summary["error"]["B"], summary["error"]["gradient"]):
+        if type(value) not in (int, float):
+            raise ValueError(f"resolution and stated errors must be numbers, got {words(value)}")
     currents = {k.removeprefix("currents_"): v for k, v in arrays.items() if k.startswith("currents_")}
     card = summary["device"]["card"]
     return Solution(
         geometry=geometry_from_text(card["text"], card["path"]),
-        currents=SurfaceCurrents(**currents) if summary["settings"]["dimension"] == 3 else MeridianCurrents(**currents),
+        currents=SurfaceCurrents(**currents) if dimension == 3 else MeridianCurrents(**currents),
         mesh=Mesh(
             points=arrays["points"],
             cells=arrays["cells"],

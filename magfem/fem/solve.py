@@ -6,6 +6,7 @@ import logging
 import resource
 import sys
 import time
+from numbers import Integral, Real
 
 import numpy as np
 
@@ -15,10 +16,11 @@ from magfem.fem import axisymmetric, scalar_potential
 from magfem.fem.discrete import Discrete
 from magfem.fem.solution import Solution
 from magfem.fields.norms import relative_errors
-from magfem.geometry import Geometry
+from magfem.geometry import Geometry, check_device
 from magfem.mesh.generate import generate
 from magfem.mesh.mesh import check_volumes
 from magfem.typing import Floats, Points
+from magfem.units import describe
 
 log = logging.getLogger("magfem")
 
@@ -47,17 +49,20 @@ def solve(
     The stated error compares with a second solution on elements twice as large, over random points of the
     device's region. Raises InputError for what cannot be solved, MeshError and ConvergenceError.
     """
+    check_device(geometry, "solve")
     dimension = choose_dimension(geometry, dimension)
     check_resolution(resolution, dimension)
-    if tolerance is not None and not 0 < tolerance < 1:
-        raise InputError(f"tolerance must be a relative error between 0 and 1, got {tolerance}")
+    if tolerance is not None and not (is_number(tolerance) and 0 < tolerance < 1):
+        raise InputError(f"tolerance must be a relative error between 0 and 1, got {describe(tolerance)}")
     started = time.perf_counter()
     layers = geometry.region.layers(np.random.default_rng(0), layers=32, per_layer=40)
     points = layers.reshape(-1, 3)
-    coarse = _jet(_discrete(geometry, dimension, resolution / 2), points)
+    coarse = None
     while True:
-        fine = _discrete(geometry, dimension, resolution)
+        fine = _discrete(geometry, dimension, resolution)  # first, so that a mesh that does not fit is refused at once
         jet = _jet(fine, points)
+        if coarse is None:
+            coarse = _jet(_discrete(geometry, dimension, resolution / 2), points)
         error = _stated_error(coarse, jet, layers, dimension)
         log.info("solution: %d unknowns, stated error %.1e in B, %.1e in the gradient", fine.unknowns, *error)
         if tolerance is None or error[0] <= tolerance:
@@ -84,7 +89,7 @@ def solve(
             "seconds": time.perf_counter() - started,
             "peak_bytes": _peak_bytes(),
         },
-        settings={"dimension": dimension, "resolution": resolution},
+        settings={"dimension": dimension, "resolution": float(resolution)},
     )
 
 
@@ -92,20 +97,25 @@ def choose_dimension(geometry: Geometry, dimension: int | None) -> int:
     """The dimension that `solve` takes; InputError for one that the device cannot be solved in."""
     if dimension is None:
         return 2 if geometry.axisymmetric else 3
-    if dimension not in (2, 3):
-        raise InputError(f"dimension must be 2 or 3, got {dimension!r}")
+    if not isinstance(dimension, Integral) or dimension not in (2, 3):
+        raise InputError(f"dimension must be 2 or 3, got {describe(dimension)}")
     if dimension == 2 and not geometry.axisymmetric:
         raise InputError("only bodies of revolution with axial magnetisation can be solved in dimension 2: use 3")
-    return dimension
+    return int(dimension)
 
 
 def check_resolution(resolution: float, dimension: int) -> None:
     """Raise InputError unless `resolution` lies in RESOLUTIONS."""
     low, high = RESOLUTIONS[dimension]
-    if not low <= resolution <= high:
+    if not (is_number(resolution) and low <= resolution <= high):
         raise InputError(
-            f"resolution must lie between {low:g} and {high:g} in dimension {dimension}, got {resolution:g}"
+            f"resolution must lie between {low:g} and {high:g} in dimension {dimension}, got {describe(resolution)}"
         )
+
+
+def is_number(value: object) -> bool:
+    """Whether a value is a real number, NumPy's included."""
+    return isinstance(value, Real) and not isinstance(value, bool)
 
 
 def _discrete(geometry: Geometry, dimension: int, resolution: float) -> Discrete:

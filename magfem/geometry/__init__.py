@@ -3,7 +3,7 @@
 from magfem.geometry.body import Body
 from magfem.geometry.card import CardOrigin
 from magfem.geometry.cylinder_magnet import CylinderMagnet
-from magfem.geometry.geometry import Geometry
+from magfem.geometry.geometry import Geometry, check_device
 from magfem.geometry.load import geometry_from_text, load_geometry
 from magfem.geometry.material import AXIAL, DIAMETRIC, PermanentMagnet
 from magfem.geometry.ring_magnet import RingMagnet
@@ -19,6 +19,7 @@ __all__ = [
     "PermanentMagnet",
     "RingMagnet",
     "card_text",
+    "check_device",
     "describe",
     "geometry_from_text",
     "load_geometry",

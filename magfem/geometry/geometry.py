@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, Protocol, runtime_checkable
 
+from magfem.errors import InputError
 from magfem.fields.hull import Hull
 from magfem.fields.region import Shell
 from magfem.geometry.body import Body
 from magfem.geometry.card import CardOrigin
 from magfem.typing import Floats
+from magfem.units import describe
 
 
+@runtime_checkable
 class Geometry(Protocol):
     """A device in its source frame: z is the axis of revolution, the origin the body's centre."""
 
@@ -79,3 +82,9 @@ class Geometry(Protocol):
     def build_meridian(self, occ: Any) -> dict[str, list[int]]:
         """Make the half section, x = rho and y = z, in `occ`; surface tags by body name."""
         ...
+
+
+def check_device(value: object, verb: str) -> None:
+    """Raise InputError, which says what `verb` takes, unless `value` is a device."""
+    if not isinstance(value, Geometry) or isinstance(value, type):
+        raise InputError(f"{verb} takes a device: magfem.load_geometry('ring_magnet_4x1.5x1'), got {describe(value)}")

@@ -12,7 +12,7 @@ import pytest
 
 import magfem
 from magfem.constants import MU_0
-from magfem.errors import ConvergenceError, InputError
+from magfem.errors import CardError, ConvergenceError, InputError
 from magfem.fem.solve import solve
 from magfem.geometry import PermanentMagnet, RingMagnet
 
@@ -88,6 +88,12 @@ def test_demagnetisation_has_the_size_of_the_demagnetising_factor(ring_2d, ring)
         ({"resolution": float("nan")}, "resolution must lie between"),
         ({"tolerance": 0.0}, "tolerance"),
         ({"tolerance": 2.0}, "tolerance"),
+        ({"dimension": "2"}, 'dimension must be 2 or 3, got "2"$'),
+        ({"dimension": np.array([2, 3])}, "dimension must be 2 or 3, got a ndarray$"),
+        ({"resolution": "1"}, 'resolution must lie between .* got "1"$'),
+        ({"resolution": None}, "resolution must lie between .* got a NoneType$"),
+        ({"resolution": True}, "resolution must lie between .* got true$"),
+        ({"tolerance": "x"}, 'tolerance must be a relative error between 0 and 1, got "x"$'),
     ],
 )
 def test_bad_arguments_are_refused_in_one_sentence(ring, arguments, message):
@@ -117,3 +123,101 @@ def test_broken_folders_are_refused(tmp_path, ring_2d):
     (tmp_path / "run" / "summary.json").write_text("{}")
     with pytest.raises(InputError, match="no saved solution"):
         magfem.load_solution(tmp_path / "run")
+
+
+@pytest.mark.parametrize("part", [0.0, 0.3, 0.99])
+def test_truncated_fields_are_refused(part, tmp_path, ring_2d):
+    ring_2d.save(tmp_path / "run")
+    fields = tmp_path / "run" / "fields.npz"
+    fields.write_bytes(fields.read_bytes()[: int(part * fields.stat().st_size)])
+    with pytest.raises(InputError, match=r"^the solution's fields cannot be read: .*fields\.npz\]$"):
+        magfem.load_solution(tmp_path / "run")
+
+
+@pytest.mark.parametrize(
+    ("edit", "message"),
+    [
+        (lambda summary: summary.pop("settings"), "not a whole solution: missing key 'settings'"),
+        (lambda summary: summary.pop("device"), "not a whole solution: missing key 'device'"),
+        (lambda summary: summary["error"].pop("B"), "not a whole solution: missing key 'B'"),
+        (lambda summary: summary["error"].update(B="small"), 'must be numbers, got "small"'),
+        (lambda summary: summary["settings"].update(dimension=3), "settings.dimension is 3, its mesh has dimension 2"),
+        (lambda summary: summary.update(device=[]), "not a whole solution: list indices"),
+        (lambda summary: summary["device"]["card"].update(text="kind = 3"), "kind must be a text"),
+        (lambda summary: summary["device"]["card"].update(text=3), "not a whole solution: "),
+    ],
+)
+def test_edited_summaries_are_refused(edit, message, tmp_path, ring_2d):
+    ring_2d.save(tmp_path / "run")
+    path = tmp_path / "run" / "summary.json"
+    summary = json.loads(path.read_text())
+    edit(summary)
+    path.write_text(json.dumps(summary))
+    with pytest.raises(CardError, match=message) as caught:
+        magfem.load_solution(tmp_path / "run")
+    assert "\n" not in str(caught.value)
+
+
+def test_fields_without_an_array_are_refused(tmp_path, ring_2d):
+    ring_2d.save(tmp_path / "run")
+    with np.load(tmp_path / "run" / "fields.npz") as stored:
+        arrays = dict(stored)
+    del arrays["body"]
+    np.savez(tmp_path / "run" / "fields.npz", **arrays)
+    with pytest.raises(CardError, match="not a whole solution: missing key 'body'"):
+        magfem.load_solution(tmp_path / "run")
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (
+            lambda: magfem.solve("ring_magnet_4x1.5x1"),
+            r"^solve takes a device: magfem.load_geometry\('ring_magnet_4x1.5x1'\), ",
+        ),
+        (lambda: magfem.solve(RingMagnet), "^solve takes a device: "),
+        (lambda: magfem.exact("ring_magnet_4x1.5x1"), "^exact takes a device: "),
+        (lambda: magfem.load_model(3), '^load_model takes a name or path: "ring.json", got 3$'),
+        (
+            lambda: magfem.load_solution(None),
+            '^load_solution takes the folder of a solution: "runs/ring", got a ',
+        ),
+    ],
+)
+def test_what_is_of_the_wrong_type_is_told_what_to_pass(call, message):
+    with pytest.raises(InputError, match=message):
+        call()
+
+
+def test_settings_are_plain_numbers(ring):
+    settings = solve(ring, dimension=np.int64(2), resolution=np.float32(0.5)).settings
+    assert settings == {"dimension": 2, "resolution": 0.5}
+    assert [type(value) for value in settings.values()] == [int, float]
+
+
+def test_what_does_not_fit_is_refused_before_anything_is_solved(rotor, monkeypatch):
+    asked = []
+
+    def refuse(geometry, dimension, resolution):
+        asked.append(resolution)
+        raise InputError("too large")
+
+    monkeypatch.setattr(import_module("magfem.fem.solve"), "generate", refuse)
+    with pytest.raises(InputError, match="too large"):
+        solve(rotor, resolution=2.0)
+    assert asked == [2.0]
+
+
+def test_fields_show_themselves_in_one_line(rigid_ring, ring_2d):
+    model = magfem.load_model("ring_magnet_4x1.5x1")
+    bound = model.report["bound"]
+    assert repr(ring_2d) == (
+        f"<Solution of 'ring magnet': dimension 2, resolution 1, stated error {ring_2d.error['B']:.1e} in B, "
+        f"{ring_2d.error['gradient']:.1e} in the gradient>"
+    )
+    assert repr(model) == (
+        f"<FieldModel {model.name!r}: {model.report['label']}, 0.5 to 6 mm from the body's hull, all round, "
+        f"bound {bound['B']:.1e} in B, {bound['gradient']:.1e} in the gradient>"
+    )
+    exact = magfem.exact(rigid_ring)
+    assert repr(exact) == "<ExactField of 'ring magnet': the closed form at recoil permeability 1, everywhere>"
