@@ -31,8 +31,8 @@ _STATED = {2: 1.0, 3: 1.8}
 """Stated error over the difference between solutions on elements of full and of twice the size, by dimension.
 
 With errors that fall with order p the finer one's is the difference over 2^p − 1: all of it in 3D, where rims
-limit p to about 1, a third or less in 2D. What is more covers what the worst point does from one unstructured mesh to the
-next; docs/accuracy.md shows the ladder of resolutions that these factors are honest on.
+limit p to about 1, a third or less in 2D. What is more covers what the worst point does from one unstructured mesh
+to the next; docs/accuracy.md shows the ladder of resolutions that these factors are honest on.
 """
 _ROUNDING = 1e-11  # nothing is stated to be better than this
 
