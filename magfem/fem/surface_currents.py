@@ -22,8 +22,8 @@ from magfem.mesh.shape_functions import triangle_rule, triangle_shapes
 from magfem.threads import in_chunks
 from magfem.typing import Floats, Jet, Points
 
-_FAR, _NEAR = 16.0, 3.0
-"""Distance over triangle size from which 3 and 12 points integrate it to 1e-6; below, it is quartered."""
+_FAR, _NEAR = 10.0, 3.5
+"""Distance over triangle size from which 6 and 16 points integrate it to 1e-7; below, it is quartered."""
 _DEEPEST = 24  # quarterings: a point on the surface itself gets the mean of both sides
 
 
@@ -49,7 +49,7 @@ class SurfaceCurrents:
         hessian = np.zeros((count if order > 1 else 0, 3, 3, 3))
         centre = self.nodes[:, :3].mean(axis=1)
         size = np.linalg.norm(self.nodes[:, :3] - centre[:, None], axis=-1).max(axis=1)
-        far, near = triangle_rule(2), triangle_rule(6)
+        far, near = triangle_rule(4), triangle_rule(8)
         places, strengths = self._elements(*near)
         # One row for each coordinate, points of the rule before triangles: the layout that vector units like.
         distant = np.concatenate([array.transpose(2, 1, 0) for array in self._elements(*far)]).copy()
@@ -303,7 +303,7 @@ def _add_close(
     gradient: Floats,
     hessian: Floats,
 ) -> None:
-    """One triangle close to the point: quarter it until every part is far enough for the 12-point rule."""
+    """One triangle close to the point: quarter it until every part is far enough for the 16-point rule."""
     shape = np.empty(6)
     du = np.empty(6)
     dv = np.empty(6)
