@@ -22,6 +22,7 @@ BALL = 1.35
 
 _RIM_REACH, _SURFACE_REACH = 2.75, 3.0
 """How far the elements take to grow to their outer size, over the growth: slow growth matters more than small rims."""
+
 MOST_UNKNOWNS = 1e6
 """What a 3D mesh may ask for: about 5 GB of memory and some minutes."""
 

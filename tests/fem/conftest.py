@@ -79,12 +79,14 @@ def rotor_layers(rotor: CylinderMagnet) -> Floats:
 
 @pytest.fixture(scope="session")
 def ring_truth(ring: RingMagnet, ring_layers: Floats) -> tuple[Floats, Floats]:
-    """B and gradient of the ring from 48 000 fourth-order unknowns: converged to 1e-8 (test_axisymmetric)."""
+    """B and gradient of the ring from 48 000 fourth-order unknowns: converged to 1e-7
+    (test_axisymmetric_truth_is_converged), and its moment and energy to the dual formulation's."""
     B, gradient = _discrete(ring, 2, 4.0).currents.jet(ring_layers.reshape(-1, 3), 1)
     return B.reshape(ring_layers.shape), gradient.reshape(*ring_layers.shape, 3)
 
 
 @pytest.fixture(scope="session")
 def rotor_truth(rotor: CylinderMagnet, rotor_layers: Floats) -> tuple[Floats, Floats]:
-    """B and gradient of the rotor from its first azimuthal mode on the half plane: converged to 1e-7."""
+    """B and gradient of the rotor from its first azimuthal mode on the half plane: converged to 1e-6
+    (test_fourier_truth_is_converged)."""
     return fourier_rotor.field(rotor, 2.0, rotor_layers)

@@ -57,6 +57,7 @@ def test_rotor_3d_matches_its_azimuthal_mode(rotor_3d, rotor_layers, rotor_truth
 
 @pytest.mark.parametrize("name", ["rigid_ring_2d", "rigid_ring_3d", "rigid_rotor_3d"])
 def test_recoil_one_matches_closed_form(name, request):
+    """Mesh, shape and integration: at recoil 1 the sources do not depend on the solve (the next two tests do)."""
     solution = request.getfixturevalue(name)
     layers = solution.geometry.region.layers(np.random.default_rng(5), 64, 32)
     B, gradient = worst(solution, layers, magfem.exact(solution.geometry).jet(layers, 1))
