@@ -2,8 +2,11 @@
 
 from magfem.geometry.body import Body
 from magfem.geometry.card import CardOrigin
+from magfem.geometry.circuit import Circuit, CoaxialWinding, FoilTrack, Stations, SweptWinding
+from magfem.geometry.conductor import Conductor
 from magfem.geometry.cylinder_magnet import CylinderMagnet
-from magfem.geometry.geometry import Geometry, check_device
+from magfem.geometry.device import Device
+from magfem.geometry.geometry import Coil, Geometry, Magnets, check_device
 from magfem.geometry.load import geometry_from_text, load_geometry
 from magfem.geometry.material import AXIAL, DIAMETRIC, PermanentMagnet
 from magfem.geometry.ring_magnet import RingMagnet
@@ -14,10 +17,19 @@ __all__ = [
     "DIAMETRIC",
     "Body",
     "CardOrigin",
+    "Circuit",
+    "CoaxialWinding",
+    "Coil",
+    "Conductor",
     "CylinderMagnet",
+    "Device",
+    "FoilTrack",
     "Geometry",
+    "Magnets",
     "PermanentMagnet",
     "RingMagnet",
+    "Stations",
+    "SweptWinding",
     "card_text",
     "check_device",
     "describe",

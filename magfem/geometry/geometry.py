@@ -1,4 +1,4 @@
-"""What every device offers to the stages on its right, whatever its kind."""
+"""What every device offers to the stages on its right: magnets on one side, coils on the other."""
 
 from __future__ import annotations
 
@@ -9,13 +9,15 @@ from magfem.fields.hull import Hull
 from magfem.fields.region import Shell
 from magfem.geometry.body import Body
 from magfem.geometry.card import CardOrigin
+from magfem.geometry.circuit import Circuit
+from magfem.geometry.conductor import Conductor
 from magfem.typing import Floats
 from magfem.units import describe
 
 
 @runtime_checkable
 class Geometry(Protocol):
-    """A device in its source frame: z is the axis of revolution, the origin the body's centre."""
+    """A device in its source frame: z is the axis of revolution or the coil's normal, the origin its centre."""
 
     kind: ClassVar[str]  # as cards write it
     dimensions: ClassVar[tuple[str, ...]]  # names of the lengths that a card's [dimensions] holds
@@ -36,13 +38,37 @@ class Geometry(Protocol):
         ...
 
     @property
-    def bodies(self) -> tuple[Body, ...]:
-        """The solids, each with its material, volume and area."""
+    def volume(self) -> float:
+        """Of all magnets or of the conductor, m³."""
         ...
 
     @property
-    def volume(self) -> float:
-        """Of all bodies, m³."""
+    def hull(self) -> Hull:
+        """The convex hull, from which distances are counted."""
+        ...
+
+    @property
+    def region(self) -> Shell:
+        """Where a model of this device must hold."""
+        ...
+
+    @property
+    def axisymmetric(self) -> bool:
+        """Whether the field is one of revolution about z."""
+        ...
+
+    def tables(self) -> dict[str, Any]:
+        """The card's tables but [region], ready for TOML."""
+        ...
+
+
+@runtime_checkable
+class Magnets(Geometry, Protocol):
+    """Permanent magnets: solids, each of one material."""
+
+    @property
+    def bodies(self) -> tuple[Body, ...]:
+        """The solids, each with its material, volume and area."""
         ...
 
     @property
@@ -56,23 +82,8 @@ class Geometry(Protocol):
         ...
 
     @property
-    def hull(self) -> Hull:
-        """The convex hull, from which distances are counted."""
-        ...
-
-    @property
     def feature_size(self) -> float:
         """The smallest thickness that a mesh must resolve, m."""
-        ...
-
-    @property
-    def region(self) -> Shell:
-        """Where a model of this device must hold."""
-        ...
-
-    @property
-    def axisymmetric(self) -> bool:
-        """Whether the field is one of revolution about z, so that the half section suffices."""
         ...
 
     def build(self, occ: Any) -> dict[str, list[int]]:
@@ -80,7 +91,22 @@ class Geometry(Protocol):
         ...
 
     def build_meridian(self, occ: Any) -> dict[str, list[int]]:
-        """Make the half section, x = rho and y = z, in `occ`; surface tags by body name."""
+        """Make the half section, x = rho and y = z, in `occ`; surface tags by body name. Axisymmetric ones only."""
+        ...
+
+
+@runtime_checkable
+class Coil(Geometry, Protocol):
+    """Current-carrying conductors in air."""
+
+    @property
+    def circuits(self) -> tuple[Circuit, ...]:
+        """What can be driven on its own: one for most coils, two for a stator, many for an array."""
+        ...
+
+    @property
+    def conductor(self) -> Conductor:
+        """The metal of all circuits."""
         ...
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -70,6 +71,14 @@ class PermanentMagnet:
         if "recoil_permeability" not in material:
             return cls(remanence, magnetisation=magnetisation)
         return cls(remanence, material.number("recoil_permeability"), magnetisation)
+
+    def table(self) -> dict[str, Any]:
+        """The [material] table that reads back to this."""
+        return {
+            "remanence": f"{self.remanence!r} T",
+            "recoil_permeability": self.recoil_permeability,
+            "magnetisation": list(self.magnetisation),
+        }
 
     @property
     def remanence_vector(self) -> Floats:

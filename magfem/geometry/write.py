@@ -8,7 +8,8 @@ from typing import Any
 
 from magfem.errors import CardError
 from magfem.geometry.card import CardOrigin
-from magfem.geometry.geometry import Geometry
+from magfem.geometry.device import length_text
+from magfem.geometry.geometry import Coil, Geometry, Magnets
 from magfem.geometry.load import geometry_from_text
 
 
@@ -18,22 +19,27 @@ def card_text(geometry: Geometry) -> str:
 
 
 def describe(geometry: Geometry) -> dict[str, Any]:
-    """What a device is, for summaries and provenance: kind, name, source, card and materials."""
+    """What a device is, for summaries and provenance: kind, name, source, card, and materials or circuits."""
     card = _card(geometry)
-    return {
+    about: dict[str, Any] = {
         "kind": geometry.kind,
         "name": geometry.name,
         "source": geometry.source,
         "card": {"path": card.path, "sha256": card.sha256, "text": card.text},
-        "bodies": [
+    }
+    if isinstance(geometry, Magnets):
+        about["bodies"] = [
             {
                 "name": body.name,
                 "remanence": body.material.remanence_vector.tolist(),
                 "recoil_permeability": body.material.recoil_permeability,
             }
             for body in geometry.bodies
-        ],
-    }
+        ]
+    if isinstance(geometry, Coil):
+        about["circuits"] = [circuit.name for circuit in geometry.circuits]
+        about["resistivity"] = geometry.conductor.resistivity
+    return about
 
 
 def _card(geometry: Geometry) -> CardOrigin:
@@ -50,26 +56,32 @@ def _card(geometry: Geometry) -> CardOrigin:
 
 
 def _fresh_card(geometry: Geometry) -> str:
-    material = geometry.bodies[0].material
-    lines = [f'kind = "{geometry.kind}"', f"name = {_quoted(geometry.name)}"]
+    head: dict[str, Any] = {"kind": geometry.kind, "name": geometry.name}
     if geometry.source:
-        lines.append(f"source = {_quoted(geometry.source)}")
-    lines += ["", "[dimensions]"]
-    lines += [f'{key} = "{getattr(geometry, key)!r} m"' for key in geometry.dimensions]
-    lines += [
-        "",
-        "[material]",
-        f'remanence = "{material.remanence!r} T"',
-        f"recoil_permeability = {material.recoil_permeability!r}",
-        f"magnetisation = {list(material.magnetisation)!r}",
-        "",
-        "[region]",
-        f'clearance = "{geometry.region.clearance!r} m"',
-        f'extent = "{geometry.region.extent!r} m"',
-    ]
-    return "\n".join(lines) + "\n"
+        head["source"] = geometry.source
+    region = geometry.region
+    limits = {"clearance": length_text(region.clearance), "extent": length_text(region.extent)}
+    return "\n".join(_lines({**head, **geometry.tables(), "region": limits})) + "\n"
 
 
-def _quoted(text: str) -> str:
-    """A TOML basic string; JSON's escapes are a subset of TOML's."""
-    return json.dumps(text, ensure_ascii=False)
+def _lines(table: dict[str, Any], path: str = "") -> list[str]:
+    """A TOML table, plain values before the tables within it."""
+    lines = [f"{key} = {_value(value)}" for key, value in table.items() if not _is_table(value)]
+    for key, value in table.items():
+        if not _is_table(value):
+            continue
+        name = f"{path}.{key}" if path else key
+        several = isinstance(value, list)
+        for entry in value if several else [value]:
+            lines += ["", f"[[{name}]]" if several else f"[{name}]", *_lines(entry, name)]
+    return lines
+
+
+def _is_table(value: object) -> bool:
+    """A table, or a list of tables."""
+    return isinstance(value, dict) or (isinstance(value, list) and bool(value) and isinstance(value[0], dict))
+
+
+def _value(value: object) -> str:
+    """Texts, numbers, booleans and lists of them: JSON's way to write them is TOML's as well."""
+    return json.dumps(value, ensure_ascii=False)
