@@ -11,7 +11,7 @@ from magfem.errors import InputError
 from magfem.fields.hull import CylinderHull
 from magfem.fields.region import Region
 from magfem.fields.terms import Terms, concatenate, frame_about, harmonics, loops
-from magfem.geometry import Geometry
+from magfem.geometry import Magnets
 from magfem.typing import ArrayLike, Booleans, Floats, Integers
 
 MOST_LOOPS = 120
@@ -64,7 +64,7 @@ def _independent(family: str, label: str, terms: Terms) -> Candidate:
     return Candidate(family, label, terms, np.arange(terms.coefficient.size))
 
 
-def wall_and_face_loops(geometry: Geometry) -> Iterator[Candidate]:
+def wall_and_face_loops(geometry: Magnets) -> Iterator[Candidate]:
     """Coaxial loops on a body of revolution: its bound currents in the places where they flow.
 
     Loops sit at Gauss–Legendre points along the walls (the currents of the remanence) and along the faces
@@ -96,7 +96,7 @@ def wall_and_face_loops(geometry: Geometry) -> Iterator[Candidate]:
         density *= 1.4
 
 
-def solid_harmonics(geometry: Geometry) -> Iterator[Candidate]:
+def solid_harmonics(geometry: Magnets) -> Iterator[Candidate]:
     """Exterior solid harmonics about the centre, those alone that a uniformly magnetised body of revolution has.
 
     The body is its own mirror image in its centre, so degrees are odd; axial magnetisation gives orders 0,
@@ -123,7 +123,7 @@ def solid_harmonics(geometry: Geometry) -> Iterator[Candidate]:
         )
 
 
-def axial_multipole(geometry: Geometry, poles: int = 6, window: Region | None = None) -> Candidate:
+def axial_multipole(geometry: Magnets, poles: int = 6, window: Region | None = None) -> Candidate:
     """The dissertation's multipole of an axisymmetric source (2.7): ∂ᵏ/∂zᵏ(1/r), k = 1…P, about the centre."""
     direction = np.asarray(geometry.bodies[0].material.magnetisation)
     degrees = list(range(1, poles + 1))
@@ -145,7 +145,7 @@ def axial_multipole(geometry: Geometry, poles: int = 6, window: Region | None = 
     )
 
 
-def eight_source(geometry: Geometry, sets: int, orders: tuple[int, ...] = (1, 3, 5)) -> Candidate:
+def eight_source(geometry: Magnets, sets: int, orders: tuple[int, ...] = (1, 3, 5)) -> Candidate:
     """The dissertation's symmetric sets of eight axial multipoles (6.1–6.3), odd orders about the magnetisation.
 
     The eight sources of a set share their coefficients. The dissertation leaves the displacements open: here
@@ -185,12 +185,12 @@ FAMILIES = {"wall_and_face_loops": wall_and_face_loops, "solid_harmonics": solid
 """Families that recipes may name: each yields its candidates from few parameters to many."""
 
 
-def family_of(geometry: Geometry) -> str:
+def family_of(geometry: Magnets) -> str:
     """The family that suits a device."""
     return "wall_and_face_loops" if geometry.axisymmetric else "solid_harmonics"
 
 
-def dissertation_families(geometry: Geometry) -> list[Candidate]:
+def dissertation_families(geometry: Magnets) -> list[Candidate]:
     """What the dissertation fits to such a device: shown beside our model, on the same data."""
     if geometry.axisymmetric:
         front = InFront(_revolved(geometry)[0].length / 2 + 2 * geometry.region.clearance)
@@ -204,7 +204,7 @@ def _gauss(count: int, low: float, high: float) -> Floats:
     return points
 
 
-def _revolved(geometry: Geometry) -> tuple[CylinderHull, float]:
+def _revolved(geometry: Magnets) -> tuple[CylinderHull, float]:
     """Hull and inner radius (m, zero without a bore) of a single body of revolution."""
     if not isinstance(geometry.hull, CylinderHull) or len(geometry.bodies) != 1:
         raise InputError(f"{geometry.name}: this family is made for a single body of revolution")

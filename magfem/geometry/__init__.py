@@ -6,6 +6,7 @@ from magfem.geometry.circuit import Circuit, CoaxialWinding, FoilTrack, Stations
 from magfem.geometry.conductor import Conductor
 from magfem.geometry.cylinder_magnet import CylinderMagnet
 from magfem.geometry.device import Device
+from magfem.geometry.disc_magnet import DiscMagnet
 from magfem.geometry.geometry import Coil, Geometry, Magnets, check_device
 from magfem.geometry.load import geometry_from_text, load_geometry
 from magfem.geometry.material import AXIAL, DIAMETRIC, PermanentMagnet
@@ -23,6 +24,7 @@ __all__ = [
     "Conductor",
     "CylinderMagnet",
     "Device",
+    "DiscMagnet",
     "FoilTrack",
     "Geometry",
     "Magnets",

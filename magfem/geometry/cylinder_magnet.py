@@ -1,4 +1,4 @@
-"""Cylinder magnets: rods, pins and discs."""
+"""Cylinder magnets: rods and pins."""
 
 from __future__ import annotations
 
@@ -20,5 +20,5 @@ class CylinderMagnet(MagnetOfRevolution):
     length: float  # m, along z
 
     @property
-    def tube(self) -> Tube:
+    def shape(self) -> Tube:
         return Tube(self.diameter, 0.0, self.length)

@@ -10,6 +10,7 @@ from magfem.errors import InputError
 from magfem.geometry.card import Table, parse_table, read_table
 from magfem.geometry.catalogue import resolve, short_path
 from magfem.geometry.cylinder_magnet import CylinderMagnet
+from magfem.geometry.disc_magnet import DiscMagnet
 from magfem.geometry.geometry import Geometry
 from magfem.geometry.ring_magnet import RingMagnet
 from magfem.units import describe, quoted
@@ -17,6 +18,7 @@ from magfem.units import describe, quoted
 KINDS: dict[str, Callable[[Table], Geometry]] = {
     CylinderMagnet.kind: CylinderMagnet.from_card,
     RingMagnet.kind: RingMagnet.from_card,
+    DiscMagnet.kind: DiscMagnet.from_card,
 }
 """Reader of the whole card by the card's `kind`."""
 

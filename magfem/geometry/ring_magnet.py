@@ -32,8 +32,8 @@ class RingMagnet(MagnetOfRevolution):
                 "dimensions.inner_diameter",
             )
         largest = max(self.outer_diameter, self.length)
-        check_thickness(self.words, "dimensions.inner_diameter", "the wall", self.tube.wall, largest)
+        check_thickness(self.words, "dimensions.inner_diameter", "the wall", self.shape.wall, largest)
 
     @property
-    def tube(self) -> Tube:
+    def shape(self) -> Tube:
         return Tube(self.outer_diameter, self.inner_diameter, self.length)

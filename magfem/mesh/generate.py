@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from magfem.errors import InputError, MeshError
-from magfem.geometry import Geometry
+from magfem.geometry import Magnets
 from magfem.mesh.mesh import Mesh
 from magfem.mesh.session import gmsh_session
 from magfem.mesh.shape_functions import shape_gradients, tetrahedron_rule
@@ -42,7 +42,7 @@ class Sizes:
     around: float = 0.0
 
 
-def element_sizes(geometry: Geometry, dimension: int, resolution: float) -> Sizes:
+def element_sizes(geometry: Magnets, dimension: int, resolution: float) -> Sizes:
     """Sizes that give the accuracy stated in the docs at `resolution` 1; doubling it halves them all.
 
     They follow the smallest thickness, but not below a share of the device's radius: thin discs and long rods
@@ -65,7 +65,7 @@ def element_sizes(geometry: Geometry, dimension: int, resolution: float) -> Size
     )
 
 
-def generate(geometry: Geometry, dimension: int, resolution: float = 1.0) -> Mesh:
+def generate(geometry: Magnets, dimension: int, resolution: float = 1.0) -> Mesh:
     """Mesh `geometry` in `dimension` 2 or 3 (2: the half plane of a body of revolution).
 
     Raises MeshError when Gmsh fails or loses a body, InputError for a mesh that would not fit into memory.
