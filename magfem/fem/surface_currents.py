@@ -16,8 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from magfem.compiled import kernel, summing_kernel
+from magfem.compiled import kernel
 from magfem.constants import MU_0
+from magfem.fem.biot_savart import add_current, add_currents
 from magfem.mesh.shape_functions import triangle_rule, triangle_shapes
 from magfem.threads import in_chunks
 from magfem.typing import Floats, Jet, Points
@@ -97,126 +98,6 @@ class SurfaceCurrents:
 
 
 @kernel
-def _add_element(
-    rx: float,
-    ry: float,
-    rz: float,
-    kx: float,
-    ky: float,
-    kz: float,
-    order: int,
-    B: Floats,
-    gradient: Floats,
-    hessian: Floats,
-) -> None:
-    """Add K × r/r³ and its derivatives with respect to the point; r leads from the element to the point."""
-    r2 = rx * rx + ry * ry + rz * rz
-    i3 = 1.0 / (r2 * np.sqrt(r2))
-    cx, cy, cz = ky * rz - kz * ry, kz * rx - kx * rz, kx * ry - ky * rx
-    B[0] += cx * i3
-    B[1] += cy * i3
-    B[2] += cz * i3
-    if order < 1:
-        return
-    # ∂_j (K × r)_i i3 = ε_iaj K_a i3 − 3 c_i r_j / r⁵
-    i5 = -3.0 * i3 / r2
-    gradient[0, 0] += cx * rx * i5
-    gradient[0, 1] += cx * ry * i5 - kz * i3
-    gradient[0, 2] += cx * rz * i5 + ky * i3
-    gradient[1, 0] += cy * rx * i5 + kz * i3
-    gradient[1, 1] += cy * ry * i5
-    gradient[1, 2] += cy * rz * i5 - kx * i3
-    gradient[2, 0] += cz * rx * i5 - ky * i3
-    gradient[2, 1] += cz * ry * i5 + kx * i3
-    gradient[2, 2] += cz * rz * i5
-    if order < 2:
-        return
-    i7 = -5.0 * i5 / r2
-    r = (rx, ry, rz)
-    c = (cx, cy, cz)
-    e = ((0.0, -kz, ky), (kz, 0.0, -kx), (-ky, kx, 0.0))
-    for i in range(3):
-        for j in range(3):
-            for k in range(3):
-                value = c[i] * r[j] * r[k] * i7 + (e[i][j] * r[k] + e[i][k] * r[j]) * i5
-                if j == k:
-                    value += c[i] * i5
-                hessian[i, j, k] += value
-
-
-@summing_kernel
-def _add_distant(
-    x: float,
-    y: float,
-    z: float,
-    distant: Floats,
-    share: Floats,
-    order: int,
-    B: Floats,
-    gradient: Floats,
-    hessian: Floats,
-) -> None:
-    """Add all elements `distant` (6, q, t), places then strengths, of triangles whose `share` (t,) is one.
-
-    The same sums as `_add_element`, written for vector units; the hessian, rarely wanted, is not.
-    """
-    if order > 1:
-        for q in range(distant.shape[1]):
-            for t in range(distant.shape[2]):
-                if share[t] == 1.0:
-                    e = distant[:, q, t]
-                    _add_element(x - e[0], y - e[1], z - e[2], e[3], e[4], e[5], order, B, gradient, hessian)
-        return
-    bx = by = bz = 0.0
-    gxx = gxy = gxz = gyx = gyy = gyz = gzx = gzy = gzz = 0.0
-    for q in range(distant.shape[1]):
-        px, py, pz = distant[0, q], distant[1, q], distant[2, q]
-        sx, sy, sz = distant[3, q], distant[4, q], distant[5, q]
-        if order == 0:
-            for t in range(distant.shape[2]):
-                rx, ry, rz = x - px[t], y - py[t], z - pz[t]
-                r2 = max(rx * rx + ry * ry + rz * rz, 1e-60)
-                i3 = share[t] / (r2 * np.sqrt(r2))
-                bx += (sy[t] * rz - sz[t] * ry) * i3
-                by += (sz[t] * rx - sx[t] * rz) * i3
-                bz += (sx[t] * ry - sy[t] * rx) * i3
-        else:
-            for t in range(distant.shape[2]):
-                rx, ry, rz = x - px[t], y - py[t], z - pz[t]
-                r2 = max(rx * rx + ry * ry + rz * rz, 1e-60)
-                inverse = 1.0 / r2
-                i3 = share[t] * inverse * np.sqrt(inverse)
-                kx, ky, kz = sx[t] * i3, sy[t] * i3, sz[t] * i3
-                cx, cy, cz = ky * rz - kz * ry, kz * rx - kx * rz, kx * ry - ky * rx
-                bx += cx
-                by += cy
-                bz += cz
-                ux, uy, uz = -3.0 * inverse * rx, -3.0 * inverse * ry, -3.0 * inverse * rz
-                gxx += cx * ux
-                gxy += cx * uy - kz
-                gxz += cx * uz + ky
-                gyx += cy * ux + kz
-                gyy += cy * uy
-                gyz += cy * uz - kx
-                gzx += cz * ux - ky
-                gzy += cz * uy + kx
-                gzz += cz * uz
-    B[0] += bx
-    B[1] += by
-    B[2] += bz
-    if order > 0:
-        gradient[0, 0] += gxx
-        gradient[0, 1] += gxy
-        gradient[0, 2] += gxz
-        gradient[1, 0] += gyx
-        gradient[1, 1] += gyy
-        gradient[1, 2] += gyz
-        gradient[2, 0] += gzx
-        gradient[2, 1] += gzy
-        gradient[2, 2] += gzz
-
-
-@kernel
 def _evaluate(
     points: Points,
     nodes: Floats,
@@ -249,7 +130,7 @@ def _evaluate(
         for t in range(nodes.shape[0]):
             dx, dy, dz = x - centre[t, 0], y - centre[t, 1], z - centre[t, 2]
             share[t] = 1.0 if dx * dx + dy * dy + dz * dz > (_FAR * size[t]) ** 2 else 0.0
-        _add_distant(x, y, z, distant, share, order, b, g, h)
+        add_currents(x, y, z, distant, share, order, b, g, h)
         for t in range(nodes.shape[0]):
             if share[t] == 1.0:
                 continue
@@ -257,7 +138,7 @@ def _evaluate(
             if dx * dx + dy * dy + dz * dz > (_NEAR * size[t]) ** 2:
                 for q in range(places.shape[1]):
                     at, K = places[t, q], strengths[t, q]
-                    _add_element(x - at[0], y - at[1], z - at[2], K[0], K[1], K[2], order, b, g, h)
+                    add_current(x - at[0], y - at[1], z - at[2], K[0], K[1], K[2], order, b, g, h)
             else:
                 _add_close(
                     x,
@@ -368,7 +249,7 @@ def _add_close(
             kx = w * (magnetisation[1] * nz - magnetisation[2] * ny - chi * (xu * pv - xv * pu))
             ky = w * (magnetisation[2] * nx - magnetisation[0] * nz - chi * (yu * pv - yv * pu))
             kz = w * (magnetisation[0] * ny - magnetisation[1] * nx - chi * (zu * pv - zv * pu))
-            _add_element(x - p[0], y - p[1], z - p[2], kx, ky, kz, order, B, gradient, hessian)
+            add_current(x - p[0], y - p[1], z - p[2], kx, ky, kz, order, B, gradient, hessian)
 
 
 @kernel
