@@ -280,7 +280,7 @@ def test_no_command_at_all_gets_the_help(capsys: pytest.CaptureFixture[str]) -> 
             f"solve {RING} -o full",
             "this folder holds other files (precious.txt): choose another or an empty one [full]",
         ),
-        (f"mesh {RING} -o ring.stl", "expected a file that ends in .msh or .vtu"),
+        (f"mesh {RING} -o ring.stl", "files that end in .stl do not hold tetra cells; formats that do: .msh, .vtu"),
         (f"mesh {RING} -o ring.vtu --resolution 1e9", "resolution must lie between"),
         (
             "mesh rotor_1x3 -o ring.vtu --dimension 2",

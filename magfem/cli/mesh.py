@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from argparse import Namespace
+from pathlib import Path
 
 from magfem.cli.console import show_result
 from magfem.cli.outputs import output_file
 from magfem.cli.parser import CommandLine, add_dimension, add_resolution
-
-ENDINGS = (".msh", ".vtu", ".vtk", ".xdmf")
-"""Formats that hold curved elements and the body each belongs to."""
 
 
 def add(commands: CommandLine) -> None:
@@ -19,11 +17,13 @@ def add(commands: CommandLine) -> None:
         run,
         "the mesh of a device as a file",
         "Meshes a device and the ball of air around it with second-order elements and writes the mesh in the\n"
-        "format that the file's ending names: .msh (Gmsh), .vtu, .vtk or .xdmf (ParaView). Lengths are in m; the\n"
-        "cell data `body` is the body's number, or -1 in air.",
+        "format that the file's ending names: .msh (Gmsh), .vtu, .vtk or .xdmf (ParaView), .med, .inp (Abaqus) and\n"
+        "whatever else meshio writes; formats without curved elements get straight ones. Lengths are in m. Bodies\n"
+        "keep their names where the format has names; the cell data `body` is the body's number, or -1 in air.",
         [
             "magfem mesh ring_magnet_4x1.5x1 -o ring.msh",
             "magfem mesh ring_magnet_4x1.5x1 -o ring.vtu --resolution 0.5",
+            "magfem mesh ring_magnet_4x1.5x1 -o ring.med",
             "magfem mesh ring_magnet_4x1.5x1 -o half_section.vtu --dimension 2",
         ],
     )
@@ -35,11 +35,15 @@ def add(commands: CommandLine) -> None:
 
 def run(options: Namespace) -> int:
     """Mesh and write."""
-    path = output_file(options.output, ENDINGS)
     from magfem.fem.solve import check_resolution, choose_dimension
     from magfem.geometry import load_geometry
-    from magfem.mesh.export import write_mesh
+    from magfem.mesh.export import ending_of, format_of, write_mesh
     from magfem.mesh.generate import generate
+
+    path = Path(options.output)
+    if not path.is_dir():
+        format_of(path, frozenset({"tetra10" if options.dimension != 2 else "triangle6"}))
+    path = output_file(options.output, [ending_of(path), path.suffix.lower()])
 
     geometry = load_geometry(options.card)
     dimension = choose_dimension(geometry, options.dimension)
