@@ -1,0 +1,186 @@
+"""Direct current in a closed ribbon of metal: where it flows, and the resistance it meets.
+
+A foil's current needs two coordinates, s along the ribbon (closed on itself) and t across. With the form
+a(u, w) = ∫ ∇u·∇w dS on the ribbon and the sheet resistance R_s = resistivity/thickness there are two descriptions:
+
+- the stream function ψ, K = ∇ψ × n, with ψ = 0 and 1 on the two edges (1 A): the power is R_s a(ψ, ψ), which no other
+  ψ makes smaller, so that a finite-element solution gives the resistance from above;
+- the potential V, K = −∇V/R_s, with a jump of 1 V round the ribbon and no flow across the edges: the power is
+  a(V, V)/R_s, the conductance from above and the resistance from below.
+
+The truth lies between the two, and the current of ψ is free of divergence exactly. Folds cost nothing, since only
+lengths along the ribbon count; corners crowd the current, which graded elements follow.
+
+In a thick track the current has three coordinates and only V is left, J = −σ∇V. Its field needs no integral over the
+volume: J has no curl inside, and with r from the source to the point,
+
+    ∫ J × r/r³ dV = −σ ∫ ∇V × ∇(1/r) dV = σ ∮ (n × ∇V)/r dS,
+
+an integral over the surface that asks only for V on it, exact inside the metal as well.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from magfem.errors import ConvergenceError
+from magfem.fem.lattice_form import LatticeForm
+from magfem.fem.sheet_currents import SheetCurrents, patches
+from magfem.geometry.circuit import FoilTrack, Stations
+from magfem.typing import Floats, Jet, Points
+
+
+@dataclass(frozen=True)
+class SheetConduction:
+    """The current of 1 A in a foil.
+
+    stations: the ribbon.  across: (2m+1,) places of the lattice across, −1 right edge, 1 left edge.
+    stream: (2n+1, 2m+1) A, on the lattice.  bounds: of the resistance, from below and from above, Ω.
+    lead_share: of the power in leads.  crowding: largest sheet current over 1 A per width.  unknowns: of one solve.
+    """
+
+    stations: Stations
+    across: Floats
+    stream: Floats
+    bounds: tuple[float, float]
+    lead_share: float
+    crowding: float
+    unknowns: int
+
+    @property
+    def resistance(self) -> float:
+        """Ω, leads included."""
+        return 0.5 * (self.bounds[0] + self.bounds[1])
+
+    def currents(self, thickness: float, layers: int = 2) -> SheetCurrents:
+        """The current of 1 A as sheets at Gauss's points of the foil's `thickness` (m).
+
+        Two layers have moments through the thickness right up to the third: what is left out falls with the fourth
+        power of thickness over distance.
+        """
+        levels, weights = np.polynomial.legendre.leggauss(layers)
+        sheets = [patches(lattice(self.stations, self.across, 0.5 * thickness * level)) for level in levels]
+        stream = patches(self.stream)
+        return SheetCurrents(np.concatenate(sheets), np.concatenate([0.5 * weight * stream for weight in weights]))
+
+
+@dataclass(frozen=True)
+class SolidCurrents:
+    """The current of 1 A in a thick track.
+
+    faces: its surface, with σV in place of a stream function.  sheets: the same current on surfaces within it, for
+    integrals over the metal.
+    """
+
+    faces: SheetCurrents
+    sheets: SheetCurrents
+
+    def jet(self, points: Points, order: int) -> Jet:
+        """(B, gradient[, hessian]) at `points` (n, 3) m, per ampere."""
+        return self.faces.layer_jet(points, order)
+
+    def vector_potential(self, points: Points) -> Floats:
+        """A (n, 3) T·m per ampere."""
+        return self.sheets.vector_potential(points)
+
+    def elements(self) -> tuple[Floats, Floats]:
+        """Current elements: places (p, q, 3) m and strengths (p, q, 3) A·m."""
+        return self.sheets.elements()
+
+    @property
+    def moment(self) -> Floats:
+        """Dipole moment (3,) A·m² per ampere."""
+        return self.sheets.moment
+
+
+def lattice(stations: Stations, across: Floats, height: float = 0.0) -> Floats:
+    """Points (2n+1, 2m+1, 3) m of a ribbon, `height` (m) above its middle surface."""
+    middle = 0.5 * (stations.left + stations.right) + height * stations.normal
+    half = 0.5 * (stations.left - stations.right)
+    points: Floats = middle[:, None] + across[:, None] * half[:, None]
+    return points
+
+
+def places_across(elements: int, graded: bool) -> Floats:
+    """The (2m+1,) places across a ribbon of m elements, −1 to 1; graded ones crowd at the edges."""
+    share = np.linspace(-1.0, 1.0, elements + 1)
+    ends = np.sin(0.5 * np.pi * share) if graded else share
+    places = np.empty(2 * elements + 1)
+    places[::2], places[1::2] = ends, 0.5 * (ends[1:] + ends[:-1])
+    return places
+
+
+def solve_sheet(track: FoilTrack, resistivity: float, resolution: float, elements: int) -> SheetConduction:
+    """The current in a foil track, `elements` (times the resolution) across its width.
+
+    resistivity: Ω·m. Raises ConvergenceError when the two bounds of the resistance contradict each other.
+    """
+    stations = track.stations(resolution)
+    across = places_across(max(2, round(elements * resolution)), graded=True)
+    points = lattice(stations, across)
+    form = LatticeForm.of(points)
+    stream = form.minimum({0.0: form.unknown[:-1, 0], 1.0: form.unknown[:-1, -1]}, jump=0.0)
+    power = form.energy(stream)
+    sheet_resistance = resistivity / track.thickness
+    above = sheet_resistance * float(power.sum())
+    below = sheet_resistance / float(form.energy(form.minimum({}, jump=1.0)).sum())
+    if not below <= above * (1 + 1e-9):
+        raise ConvergenceError(f"the bounds of a track's resistance contradict each other: {below:g} and {above:g} ohm")
+    return SheetConduction(
+        stations=stations,
+        across=across,
+        stream=stream,
+        bounds=(below, above),
+        lead_share=float(power[stations.lead].sum() / power.sum()),
+        crowding=_crowding(points, stream),
+        unknowns=form.size,
+    )
+
+
+def solve_solid(
+    track: FoilTrack, resistivity: float, resolution: float, elements: int
+) -> tuple[SheetConduction, SolidCurrents, float]:
+    """The current in a thick track, its cross-section resolved: the foil's description, the currents, the resistance.
+
+    The thickness gets half as many elements as the width. The resistance (Ω) is one from below.
+    """
+    sheet = solve_sheet(track, resistivity, resolution, elements)
+    through = places_across(max(2, round(0.5 * elements * resolution)), graded=True)
+    levels = [lattice(sheet.stations, sheet.across, 0.5 * track.thickness * level) for level in through]
+    points = np.stack(levels, axis=2)
+    form = LatticeForm.of(points)
+    potential = form.minimum({}, jump=1.0)
+    conductance = float(form.energy(potential).sum())  # over σ
+    # For 1 A, σV falls by 1/conductance along the ribbon; normals point outwards.
+    stream = potential / conductance
+    sides = [
+        (points[:, :, -1], stream[:, :, -1]),
+        (points[:, ::-1, 0], stream[:, ::-1, 0]),
+        (points[:, -1, ::-1], stream[:, -1, ::-1]),
+        (points[:, 0], stream[:, 0]),
+    ]
+    faces = SheetCurrents(
+        np.concatenate([patches(place) for place, _ in sides]),
+        np.concatenate([patches(value) for _, value in sides]),
+    )
+    return sheet, SolidCurrents(faces, sheet.currents(track.thickness, layers=5)), resistivity / conductance
+
+
+def evenly_spread(stations: Stations, turns: float) -> SheetCurrents:
+    """A winding's layer: `turns` A per ampere, spread evenly over the ribbon's width."""
+    across = places_across(1, graded=False)
+    points = lattice(stations, across)
+    stream = np.broadcast_to(turns * 0.5 * (1 + across), points.shape[:2])
+    return SheetCurrents(patches(points), patches(np.ascontiguousarray(stream)))
+
+
+def _crowding(points: Floats, stream: Floats) -> float:
+    """Largest sheet current in the middles of elements over 1 A per width, the median one of the ribbon."""
+    nodes, psi = patches(points), patches(stream)
+    xu, xv = nodes[:, 7] - nodes[:, 1], nodes[:, 5] - nodes[:, 3]
+    pu, pv = (psi[:, 7] - psi[:, 1])[:, None], (psi[:, 5] - psi[:, 3])[:, None]
+    K = np.linalg.norm(xu * pv - xv * pu, axis=1) / np.linalg.norm(np.cross(xu, xv), axis=1)
+    width = np.linalg.norm(np.diff(points[1::2, ::2], axis=1), axis=-1).sum(axis=1)
+    return float(K.max() * np.median(width))
