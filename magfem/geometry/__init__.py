@@ -11,6 +11,8 @@ from magfem.geometry.geometry import Coil, Geometry, Magnets, check_device
 from magfem.geometry.load import geometry_from_text, load_geometry
 from magfem.geometry.material import AXIAL, DIAMETRIC, PermanentMagnet
 from magfem.geometry.ring_magnet import RingMagnet
+from magfem.geometry.solenoid import Solenoid
+from magfem.geometry.wire import Wire
 from magfem.geometry.write import card_text, describe
 
 __all__ = [
@@ -30,8 +32,10 @@ __all__ = [
     "Magnets",
     "PermanentMagnet",
     "RingMagnet",
+    "Solenoid",
     "Stations",
     "SweptWinding",
+    "Wire",
     "card_text",
     "check_device",
     "describe",

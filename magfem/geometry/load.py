@@ -13,12 +13,14 @@ from magfem.geometry.cylinder_magnet import CylinderMagnet
 from magfem.geometry.disc_magnet import DiscMagnet
 from magfem.geometry.geometry import Geometry
 from magfem.geometry.ring_magnet import RingMagnet
+from magfem.geometry.solenoid import Solenoid
 from magfem.units import describe, quoted
 
 KINDS: dict[str, Callable[[Table], Geometry]] = {
     CylinderMagnet.kind: CylinderMagnet.from_card,
     RingMagnet.kind: RingMagnet.from_card,
     DiscMagnet.kind: DiscMagnet.from_card,
+    Solenoid.kind: Solenoid.from_card,
 }
 """Reader of the whole card by the card's `kind`."""
 
