@@ -80,7 +80,7 @@ def newton_derivatives(points: ArrayLike, size: ArrayLike, lowest: int, highest:
         _block(flat[chunk], half, highest, components[chunk])
 
     in_chunks(run, flat.shape[0], THREAD)
-    return _tensors(components.reshape(*array.shape[:-1], -1), lowest, highest)
+    return symmetric_tensors(components.reshape(*array.shape[:-1], -1), lowest, highest)
 
 
 def block_jet(points: ArrayLike, size: ArrayLike, magnetisation: ArrayLike, order: int = 1) -> Jet:
@@ -127,7 +127,7 @@ def rectangle_derivatives(points: ArrayLike, width: float, height: float, highes
         _rectangle(flat[chunk], width / 2, height / 2, highest, components[chunk])
 
     in_chunks(run, flat.shape[0], THREAD)
-    return _tensors(components.reshape(*array.shape[:-1], -1), 1, highest)
+    return symmetric_tensors(components.reshape(*array.shape[:-1], -1), 1, highest)
 
 
 def _moved(points: Floats, half: Floats) -> Floats:
@@ -140,8 +140,11 @@ def _moved(points: Floats, half: Floats) -> Floats:
     return np.where(on_edge & near, np.copysign(half - step, points), points)
 
 
-def _tensors(components: Floats, lowest: int, highest: int) -> tuple[Floats, ...]:
-    """Symmetric tensors from their components (..., n), in the sequence of `_COUNTS`."""
+def symmetric_tensors(components: Floats, lowest: int, highest: int) -> tuple[Floats, ...]:
+    """Symmetric tensors (..., 3), (..., 3, 3), … of the orders from `lowest` to `highest` from their components.
+
+    `components` (..., n) holds x, y, z, xx, xy, xz, yy, yz, zz, xxx, … from order 1 on.
+    """
     return tuple(components[..., _spread(order)] for order in range(lowest, highest + 1))
 
 
