@@ -80,7 +80,7 @@ def newton_derivatives(points: ArrayLike, size: ArrayLike, lowest: int, highest:
         _block(flat[chunk], half, highest, components[chunk])
 
     in_chunks(run, flat.shape[0], THREAD)
-    return symmetric_tensors(components.reshape(*array.shape[:-1], -1), lowest, highest)
+    return symmetric_tensors(components.reshape(*array.shape[:-1], components.shape[1]), lowest, highest)
 
 
 def block_jet(points: ArrayLike, size: ArrayLike, magnetisation: ArrayLike, order: int = 1) -> Jet:
@@ -127,7 +127,7 @@ def rectangle_derivatives(points: ArrayLike, width: float, height: float, highes
         _rectangle(flat[chunk], width / 2, height / 2, highest, components[chunk])
 
     in_chunks(run, flat.shape[0], THREAD)
-    return symmetric_tensors(components.reshape(*array.shape[:-1], -1), 1, highest)
+    return symmetric_tensors(components.reshape(*array.shape[:-1], components.shape[1]), 1, highest)
 
 
 def _moved(points: Floats, half: Floats) -> Floats:
@@ -278,12 +278,12 @@ def _by_gauss(point: Floats, half: Floats, count: Integers, highest: int, out: F
             weight = volume * _RULES[1, count[0], nx] * _RULES[1, count[1], ny]
             for nz in range(count[2]):
                 u[2] = point[2] - half[2] * _RULES[0, count[2], nz]
-                _add_pole(u, weight * _RULES[1, count[2], nz], highest, out)
+                add_pole(u, weight * _RULES[1, count[2], nz], highest, out)
 
 
 @kernel
-def _add_pole(u: Floats, weight: float, highest: int, out: Floats) -> None:
-    """Add the derivatives of weight/|u|, orders 1 to `highest`."""
+def add_pole(u: Floats, weight: float, highest: int, out: Floats) -> None:
+    """Add the derivatives of weight/|u|, orders 1 to `highest`, to `out` (n,), components as in `symmetric_tensors`."""
     square = 1.0 / (u[0] * u[0] + u[1] * u[1] + u[2] * u[2])
     r3 = weight * square * sqrt(square)
     r5 = 3.0 * r3 * square

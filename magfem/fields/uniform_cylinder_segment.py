@@ -13,29 +13,37 @@ is singular at φ_point ± iη with cosh η = (R² + ρ² + ζ²)/(2Rρ), ζ the
 no panel is wider than its middle is far from there, so that each converges as 3.7^(−2 NODES). The sides are
 flat rectangles in closed form (`uniform_block`).
 
+Far away charges and currents cancel. There the Newtonian potential U(x) = 1/(4π) ∫ dV / |x − y| is derived
+under the integral, B_i = µ0 M_j ∂_i ∂_j U, by the same panels in φ and Gauss–Legendre rules in ρ and z.
+
 Compare Slanovc et al., J. Magn. Magn. Mater. 559, 169482 (2022), for an all-analytic form of B.
 """
 
 from __future__ import annotations
 
-from math import asinh, atan2, cos, pi, sin, sqrt
+from math import asinh, atan2, cos, log, pi, sin, sqrt
 
 import numpy as np
 
 from magfem.compiled import kernel
 from magfem.constants import MU_0
-from magfem.fields.uniform_block import rectangle_derivatives, symmetric_tensors
+from magfem.fields.uniform_block import add_pole, rectangle_derivatives, symmetric_tensors
 from magfem.threads import in_chunks
 from magfem.typing import ArrayLike, Booleans, Floats, Jet, Points
 
 NODES = 14  # of a panel
+FAR = 2.0  # distance, in circumscribed radii, beyond which the volume is integrated over
+SECTION = 20  # nodes, at most, along ρ and along z of that integral
 WIDEST = 1.2  # rad, half a panel at most
 SURFACE = 1e-7  # points nearer to the surface, in units of the shortest half size, are moved inwards by this
 ROUNDING = 1e-12  # points nearer to the surface, in units of the outer radius, lie on it
 THREAD = 100  # points that are worth a thread
 
 _ABSCISSAE, _WEIGHTS = np.polynomial.legendre.leggauss(NODES)
-_COMPONENTS = (0, 3, 9, 19)  # up to each order
+_COMPONENTS = (0, 3, 9, 19, 34)  # up to each order
+_RULES = np.zeros((2, SECTION + 1, SECTION))
+for _count in range(1, SECTION + 1):
+    _RULES[:, _count, :_count] = np.polynomial.legendre.leggauss(_count)
 _ODD_IN_Z = np.array([2, 5, 7, 11, 13, 16, 18])  # z, xz, yz, xxz, xyz, yyz, zzz
 _LEVI_CIVITA = np.cross(np.eye(3)[:, None], np.eye(3)[None])  # [j, k, i] = ε_ijk
 
@@ -70,7 +78,13 @@ def cylinder_segment_jet(
     m = np.asarray(magnetisation, dtype=float)
     turn = (end - start) / 2
     whole = turn > np.pi * (1 - 1e-12)
-    flat, inside = _moved(array.reshape(-1, 3), inner_radius, outer_radius, length, start, end, whole)
+    every = array.reshape(-1, 3)
+    far = np.linalg.norm(every, axis=1) > FAR * np.hypot(outer_radius, length / 2)
+    result = [np.empty((len(every), *(3,) * (n + 1))) for n in range(order + 1)]
+    distant = _volume_derivatives(every[far], inner_radius, outer_radius, length, start, end, order + 2)
+    for value, tensor in zip(result, distant, strict=True):
+        value[far] = tensor @ m
+    flat, inside = _moved(every[~far], inner_radius, outer_radius, length, start, end, whole)
     jet = [np.zeros((flat.shape[0], *(3,) * (n + 1))) for n in range(order + 1)]
     jet[0] += inside[:, None] * m * [1, 1, 0]
 
@@ -88,7 +102,9 @@ def cylinder_segment_jet(
         outward, along = _axes(azimuth)
         side = _side_derivatives(flat, inner_radius, outer_radius, length, azimuth, order + 1)
         add(side, sign * float(m @ along), -sign * m[2] * outward)
-    return tuple(MU_0 * value.reshape(*array.shape[:-1], *value.shape[1:]) for value in jet)
+    for value, near in zip(result, jet, strict=True):
+        value[~far] = near
+    return tuple(MU_0 * value.reshape(*array.shape[:-1], *value.shape[1:]) for value in result)
 
 
 def _axes(azimuth: float) -> tuple[Floats, Floats]:
@@ -149,6 +165,72 @@ def _wall_derivatives(
     return symmetric_tensors(out[:, 0], 1, highest), symmetric_tensors(out[:, 1], 1, highest)
 
 
+def _volume_derivatives(
+    points: Points, inner: float, outer: float, length: float, start: float, end: float, highest: int
+) -> tuple[Floats, ...]:
+    """∂U of the sector at points beyond FAR, orders 2 to `highest`."""
+    out = np.zeros((points.shape[0], _COMPONENTS[highest]))
+
+    def run(chunk: slice) -> None:
+        _volume(points[chunk], inner, outer, length / 2, start, end, highest, out[chunk])
+
+    in_chunks(run, points.shape[0], THREAD)
+    return symmetric_tensors(out, 2, highest)
+
+
+@kernel
+def _volume(
+    points: Floats, inner: float, outer: float, half: float, start: float, end: float, highest: int, out: Floats
+) -> None:
+    """Add the components (n, c) of the derivatives of U to `out`."""
+    breadth, middle = (outer - inner) / 2, (outer + inner) / 2
+    u = np.empty(3)
+    for n in range(points.shape[0]):
+        x, y, z = points[n]
+        rho = sqrt(x * x + y * y)
+        gap = sqrt(rho * rho + z * z) - sqrt(outer * outer + half * half)
+        across = _section_nodes(gap / breadth)
+        along = _section_nodes(gap / half)
+        origin = atan2(y, x)
+        a = start - origin
+        a -= 2.0 * pi * np.floor(a / (2.0 * pi) + 0.5)
+        last = a + (end - start)
+        # The nearest singularity for any ρ and z of the section: |y|² + |x|² − 2 |y| |x| cos at the largest |y|.
+        ball = sqrt(outer * outer + half * half)
+        far = sqrt(rho * rho + z * z)
+        eta = 2.0 * asinh((far - ball) / sqrt(4.0 * ball * far))
+        while a < last:
+            width = _panel(a, last, eta)
+            for node in range(NODES):
+                phi = origin + a + width * (1.0 + _ABSCISSAE[node])
+                c, s = cos(phi), sin(phi)
+                for i in range(across):
+                    radius = middle + breadth * _RULES[0, across, i]
+                    weight = _WEIGHTS[node] * width * _RULES[1, across, i] * breadth * radius * half / (4.0 * pi)
+                    u[0], u[1] = x - radius * c, y - radius * s
+                    for j in range(along):
+                        u[2] = z - half * _RULES[0, along, j]
+                        add_pole(u, weight * _RULES[1, along, j], highest, out[n])
+            a += 2.0 * width
+            if last - a < 1e-15:
+                break
+
+
+@kernel
+def _section_nodes(gap: float) -> int:
+    """Nodes of a rule whose integrand is singular no nearer than `gap` half widths beside it."""
+    return min(SECTION, int(15.0 / log(gap + sqrt(1.0 + gap * gap))) + 2)
+
+
+@kernel
+def _panel(a: float, last: float, eta: float) -> float:
+    """Half width of the panel that begins at `a`, with singularities at ± iη and 2π ± iη."""
+    width = min(WIDEST, _reach(-a, eta), _reach(2.0 * pi - a, eta))
+    if a + 2.2 * width > last:
+        width = min(width, 0.5 * (last - a))
+    return width
+
+
 @kernel
 def _wall(points: Floats, radius: float, half: float, start: float, end: float, highest: int, out: Floats) -> None:
     """Components (n, 2, c) of the derivatives of S, cosine then sine."""
@@ -168,9 +250,7 @@ def _wall(points: Floats, radius: float, half: float, start: float, end: float, 
         for i in range(size):
             out[n, 0, i] = out[n, 1, i] = 0.0
         while a < last:
-            width = min(WIDEST, _reach(-a, eta), _reach(2.0 * pi - a, eta))
-            if a + 2.2 * width > last:
-                width = min(width, 0.5 * (last - a))
+            width = _panel(a, last, eta)
             for node in range(NODES):
                 phi = origin + a + width * (1.0 + _ABSCISSAE[node])
                 c, s = cos(phi), sin(phi)
