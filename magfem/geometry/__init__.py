@@ -1,23 +1,40 @@
 """Device cards and the devices they describe."""
 
+from magfem.geometry.block_magnet import BlockMagnet
 from magfem.geometry.body import Body
 from magfem.geometry.card import CardOrigin
 from magfem.geometry.circuit import Circuit, CoaxialWinding, FoilTrack, Stations, SweptWinding
 from magfem.geometry.conductor import Conductor
 from magfem.geometry.cylinder_magnet import CylinderMagnet
+from magfem.geometry.cylinder_segment_magnet import CylinderSegmentMagnet
 from magfem.geometry.device import Device
 from magfem.geometry.disc_magnet import DiscMagnet
 from magfem.geometry.geometry import Coil, Geometry, Magnets, check_device
+from magfem.geometry.grades import GRADES, Grade, grade_rows
+from magfem.geometry.halbach_array import HalbachArray
+from magfem.geometry.halbach_ring import HalbachRing
+from magfem.geometry.helmholtz_pair import HelmholtzPair
 from magfem.geometry.load import geometry_from_text, load_geometry
+from magfem.geometry.loop_coil import LoopCoil
+from magfem.geometry.magnet_assembly import MagnetAssembly, PlacedMagnet
+from magfem.geometry.magnet_stack import MagnetStack
+from magfem.geometry.magnetic_solids import MagneticSolids
 from magfem.geometry.material import AXIAL, DIAMETRIC, PermanentMagnet
+from magfem.geometry.meshed_magnets import MeshedMagnets
+from magfem.geometry.part import Part
+from magfem.geometry.racetrack_coil import RacetrackCoil
 from magfem.geometry.ring_magnet import RingMagnet
+from magfem.geometry.saddle_coil import SaddleCoil
 from magfem.geometry.solenoid import Solenoid
+from magfem.geometry.sphere_magnet import SphereMagnet
 from magfem.geometry.wire import Wire
 from magfem.geometry.write import card_text, describe
 
 __all__ = [
     "AXIAL",
     "DIAMETRIC",
+    "GRADES",
+    "BlockMagnet",
     "Body",
     "CardOrigin",
     "Circuit",
@@ -25,14 +42,29 @@ __all__ = [
     "Coil",
     "Conductor",
     "CylinderMagnet",
+    "CylinderSegmentMagnet",
     "Device",
     "DiscMagnet",
     "FoilTrack",
     "Geometry",
+    "Grade",
+    "HalbachArray",
+    "HalbachRing",
+    "HelmholtzPair",
+    "LoopCoil",
+    "MagnetAssembly",
+    "MagnetStack",
+    "MagneticSolids",
     "Magnets",
+    "MeshedMagnets",
+    "Part",
     "PermanentMagnet",
+    "PlacedMagnet",
+    "RacetrackCoil",
     "RingMagnet",
+    "SaddleCoil",
     "Solenoid",
+    "SphereMagnet",
     "Stations",
     "SweptWinding",
     "Wire",
@@ -40,5 +72,6 @@ __all__ = [
     "check_device",
     "describe",
     "geometry_from_text",
+    "grade_rows",
     "load_geometry",
 ]

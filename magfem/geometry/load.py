@@ -7,20 +7,44 @@ from collections.abc import Callable
 from difflib import get_close_matches
 
 from magfem.errors import InputError
+from magfem.geometry.block_magnet import BlockMagnet
 from magfem.geometry.card import Table, parse_table, read_table
 from magfem.geometry.catalogue import resolve, short_path
 from magfem.geometry.cylinder_magnet import CylinderMagnet
+from magfem.geometry.cylinder_segment_magnet import CylinderSegmentMagnet
 from magfem.geometry.disc_magnet import DiscMagnet
 from magfem.geometry.geometry import Geometry
+from magfem.geometry.halbach_array import HalbachArray
+from magfem.geometry.halbach_ring import HalbachRing
+from magfem.geometry.helmholtz_pair import HelmholtzPair
+from magfem.geometry.loop_coil import LoopCoil
+from magfem.geometry.magnet_assembly import MagnetAssembly
+from magfem.geometry.magnet_stack import MagnetStack
+from magfem.geometry.meshed_magnets import MeshedMagnets
+from magfem.geometry.racetrack_coil import RacetrackCoil
 from magfem.geometry.ring_magnet import RingMagnet
+from magfem.geometry.saddle_coil import SaddleCoil
 from magfem.geometry.solenoid import Solenoid
+from magfem.geometry.sphere_magnet import SphereMagnet
 from magfem.units import describe, quoted
 
 KINDS: dict[str, Callable[[Table], Geometry]] = {
     CylinderMagnet.kind: CylinderMagnet.from_card,
+    MeshedMagnets.kind: MeshedMagnets.from_card,
     RingMagnet.kind: RingMagnet.from_card,
     DiscMagnet.kind: DiscMagnet.from_card,
+    MagnetStack.kind: MagnetStack.from_card,
+    BlockMagnet.kind: BlockMagnet.from_card,
+    SphereMagnet.kind: SphereMagnet.from_card,
+    CylinderSegmentMagnet.kind: CylinderSegmentMagnet.from_card,
+    HalbachRing.kind: HalbachRing.from_card,
+    HalbachArray.kind: HalbachArray.from_card,
+    MagnetAssembly.kind: MagnetAssembly.from_card,
     Solenoid.kind: Solenoid.from_card,
+    HelmholtzPair.kind: HelmholtzPair.from_card,
+    LoopCoil.kind: LoopCoil.from_card,
+    RacetrackCoil.kind: RacetrackCoil.from_card,
+    SaddleCoil.kind: SaddleCoil.from_card,
 }
 """Reader of the whole card by the card's `kind`."""
 

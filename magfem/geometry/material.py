@@ -13,7 +13,7 @@ import numpy as np
 from magfem.errors import InputError
 from magfem.geometry.card import Table
 from magfem.geometry.grades import REFERENCE_TEMPERATURE, Grade, grade_named
-from magfem.geometry.limits import InvalidValue, check_number, is_finite
+from magfem.geometry.limits import InvalidValue, check_number
 from magfem.typing import Floats
 from magfem.units import describe, format_quantity, quoted
 
@@ -82,11 +82,10 @@ class PermanentMagnet:
                 f"got {format_quantity(self.remanence, 'flux density')}",
                 "material.remanence",
             )
-        if (
-            self.temperature is not None
-            and is_finite(self.temperature)
-            and self.temperature > grade.highest_temperature
-        ):
+        if self.temperature is None:
+            return
+        check_number(_SUBJECT, "material.temperature", self.temperature)
+        if self.temperature > grade.highest_temperature:
             raise InvalidValue(
                 f"{_SUBJECT}: temperature must be at most {_celsius(grade.highest_temperature)} for {grade.name}: "
                 f"it loses remanence for good above; got {_celsius(self.temperature)}",

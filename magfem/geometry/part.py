@@ -112,4 +112,5 @@ class Part:
 
     def _local(self, points: Points) -> Points:
         moved = points - np.array(self.position)
-        return moved if self.rotation == NOWHERE else moved @ self.turn.as_matrix()
+        turned: Points = moved if self.rotation == NOWHERE else moved @ self.turn.as_matrix()
+        return turned

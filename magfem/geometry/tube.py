@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from magfem.fields.hull import CylinderHull
-from magfem.fields.uniform_cylinder import cylinder_jet, ring_jet
 from magfem.geometry.shape import arc, sagitta
 from magfem.typing import ArrayLike, Booleans, Jet, Points
 
@@ -88,6 +87,8 @@ class Tube:
 
     def jet(self, points: Points, magnetisation: ArrayLike, order: int) -> Jet:
         """The closed form of `magfem.fields.uniform_cylinder`."""
+        from magfem.fields.uniform_cylinder import cylinder_jet, ring_jet
+
         outer, inner = self.outer_diameter / 2, self.inner_diameter / 2
         if inner > 0:
             return ring_jet(points, inner, outer, self.length, magnetisation, order)

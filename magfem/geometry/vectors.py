@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from magfem.errors import InputError
@@ -11,9 +13,15 @@ from magfem.units import describe, quantity
 Vector = tuple[float, float, float]
 
 
-def lengths_of(value: object) -> bool:
+def is_triple(value: object) -> bool:
     """Whether a value is a sequence of three."""
     return isinstance(value, list | tuple | np.ndarray) and len(value) == 3
+
+
+def triple(value: Iterable[float]) -> Vector:
+    """Three numbers as a tuple of floats."""
+    x, y, z = map(float, value)
+    return x, y, z
 
 
 def three_lengths(table: Table, key: str) -> Vector:
@@ -29,7 +37,7 @@ def three_angles(table: Table, key: str) -> Vector:
 def three_numbers(table: Table, key: str) -> Vector:
     """Three bare numbers at `key`. Raises CardError."""
     value = table.value(key)
-    if not (lengths_of(value) and all(isinstance(one, int | float) and not isinstance(one, bool) for one in value)):  # type: ignore[attr-defined]
+    if not (is_triple(value) and all(isinstance(one, int | float) and not isinstance(one, bool) for one in value)):  # type: ignore[attr-defined]
         raise table.error(f"{key} must be three numbers such as [0, 0, 1], got {_shown(value)}", key)
     x, y, z = map(float, value)  # type: ignore[call-overload]
     return x, y, z

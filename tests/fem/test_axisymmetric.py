@@ -8,14 +8,15 @@ from fem.sphere_device import Sphere
 
 from magfem.fem import axisymmetric
 from magfem.mesh import generate as generation
-from magfem.mesh.generate import Sizes, generate
+from magfem.mesh.generate import generate
+from magfem.mesh.sizes import Sizes, Wanted
 
 
 @pytest.mark.parametrize("offset", [(0.0, 0.0, 0.0), (0.0, 0.0, 0.2)])
 def test_sphere_of_high_recoil_permeability(offset, monkeypatch):
     """B inside and outside a sphere with µ = 3, centred and off the centre of the open boundary."""
     sphere = Sphere(permeability=3.0, offset=offset)
-    monkeypatch.setattr(generation, "element_sizes", lambda *_: Sizes(0.05, 0.05, 0.15))
+    monkeypatch.setattr(generation, "element_sizes", lambda *_: Wanted({"magnet": Sizes(0.05, 0.05)}, 0.15))
     mesh = generate(sphere, 2)
     solved = axisymmetric.solve(mesh, np.array([3.0]), np.array([[0.0, 0.0, 1.0]]))
     rng = np.random.default_rng(0)

@@ -9,13 +9,14 @@ from magfem.errors import ConvergenceError
 from magfem.fem.linear_solver import solve_open, two_level
 from magfem.fem.open_boundary import sphere
 from magfem.fem.stiffness import assemble
-from magfem.mesh.generate import Sizes, generate
+from magfem.mesh.generate import generate
+from magfem.mesh.sizes import Sizes, Wanted
 
 
 @pytest.fixture(scope="module")
 def system(rotor):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("magfem.mesh.generate.element_sizes", lambda *_: Sizes(2e-4, 2e-4, 1e-3))
+        patch.setattr("magfem.mesh.generate.element_sizes", lambda *_: Wanted({"magnet": Sizes(2e-4, 2e-4)}, 1e-3))
         mesh = generate(rotor, 3)
     one = np.ones(mesh.cells.shape[0])
     stiffness, load, _ = assemble(mesh, one, np.where(mesh.body[:, None] >= 0, [1.0, 2.0, 3.0], 0.0))

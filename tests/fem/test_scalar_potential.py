@@ -8,12 +8,13 @@ from fem.sphere_device import Sphere
 
 from magfem.fem import scalar_potential
 from magfem.mesh import generate as generation
-from magfem.mesh.generate import Sizes, generate
+from magfem.mesh.generate import generate
 from magfem.mesh.shape_functions import tetrahedron_rule
+from magfem.mesh.sizes import Sizes, Wanted
 
 
 def solve(sphere, size, monkeypatch, ball=1.35):
-    monkeypatch.setattr(generation, "element_sizes", lambda *_: Sizes(size, size, size))
+    monkeypatch.setattr(generation, "element_sizes", lambda *_: Wanted({"magnet": Sizes(size, size)}, size))
     monkeypatch.setattr(generation, "BALL", ball)
     mesh = generate(sphere, 3)
     magnetisation = np.array([[0.0, 0.0, 1.0]])
