@@ -40,7 +40,7 @@ def sphere_jet(points: ArrayLike, radius: float, magnetisation: ArrayLike, order
         jet.append(_third(n) @ m / (radius * r[..., None, None] ** 4))
     if order > 1:
         jet.append(_fourth(n) @ m / (radius**2 * r[..., None, None, None] ** 5))
-    within = [2 / 3 * m, 0.0, 0.0]
+    within = [2 / 3 * m, np.zeros(()), np.zeros(())]
     return tuple(
         np.where(inside.reshape(inside.shape + (1,) * rank), value, outside)
         for rank, (value, outside) in enumerate(zip(within, jet, strict=False), start=1)
@@ -55,7 +55,7 @@ def _second(n: Floats) -> Floats:
 
 def _third(n: Floats) -> Floats:
     """r⁴/3 ∂_i∂_j∂_k (1/r) = n_i δ_jk + n_j δ_ik + n_k δ_ij − 5 n_i n_j n_k."""
-    tensor = -5 * np.einsum("...i,...j,...k->...ijk", n, n, n)
+    tensor: Floats = -5 * np.einsum("...i,...j,...k->...ijk", n, n, n)
     for axes in ("ijk", "jik", "kij"):
         tensor += np.einsum(f"...{axes[0]},{axes[1:]}->...ijk", n, np.eye(3))
     return tensor
@@ -63,7 +63,7 @@ def _third(n: Floats) -> Floats:
 
 def _fourth(n: Floats) -> Floats:
     """r⁵/3 ∂_i∂_j∂_k∂_l (1/r) = 35 n_i n_j n_k n_l − 5 (n_i n_j δ_kl + 5 more) + (δ_ij δ_kl + 2 more)."""
-    tensor = 35 * np.einsum("...i,...j,...k,...l->...ijkl", n, n, n, n)
+    tensor: Floats = 35 * np.einsum("...i,...j,...k,...l->...ijkl", n, n, n, n)
     for axes in ("ijkl", "ikjl", "iljk", "jkil", "jlik", "klij"):
         tensor -= 5 * np.einsum(f"...{axes[0]},...{axes[1]},{axes[2:]}->...ijkl", n, n, np.eye(3))
     for axes in ("ijkl", "ikjl", "iljk"):
