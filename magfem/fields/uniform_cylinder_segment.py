@@ -16,7 +16,18 @@ flat rectangles in closed form (`uniform_block`).
 Far away charges and currents cancel. There the Newtonian potential U(x) = 1/(4π) ∫ dV / |x − y| is derived
 under the integral, B_i = µ0 M_j ∂_i ∂_j U, by the same panels in φ and Gauss–Legendre rules in ρ and z.
 
-Compare Slanovc et al., J. Magn. Magn. Mater. 559, 169482 (2022), for an all-analytic form of B.
+Slanovc et al., J. Magn. Magn. Mater. 559, 169482 (2022), give an all-analytic form of B.
+
+Measured on a ring, inner radius 1, outer 2, length 1.5, whole and cut into four, against `ring_jet`: relative
+error of B 1e-14 everywhere farther than 1e-4 from edges (the edges of the ring alone: 1e-10 at 1e-6); of gradient
+and hessian, d off the curved walls, in units of the inner radius,
+
+    d = 0.1     5e-14   6e-13        d = 0.001    2e-12   5e-9
+    d = 0.01    1e-12   2e-10        d = 0.0001   1e-11   5e-7
+
+and less off faces and edges. On the walls themselves, being moved inwards, B and gradient hold to 1e-7; the
+hessian has no digits there. From 0.3 to 100 sizes away all three agree with integrated dipoles to 1e-11, those of
+a thin shell among them. A point takes 10 to 30 µs with all three.
 """
 
 from __future__ import annotations
@@ -72,7 +83,7 @@ def cylinder_segment_jet(
     -------
     B (..., 3) T, gradient (..., 3, 3) T/m, hessian (..., 3, 3, 3) T/m², up to `order`.
     The surface belongs to the magnet. On it, and inside nearer than 1e-7 of the shortest half size: the values
-    that far inwards, large on edges.
+    that far inwards, large on edges; the hessian next to a curved wall only when farther off than 1e-5.
     """
     array = np.asarray(points, dtype=float)
     m = np.asarray(magnetisation, dtype=float)
@@ -144,12 +155,7 @@ def _side_derivatives(
     outward, along = _axes(azimuth)
     frame = np.stack([outward, along, [0.0, 0.0, 1.0]])
     local = (points - (inner + outer) / 2 * outward) @ frame.T
-    turned = []
-    for order, tensor in enumerate(rectangle_derivatives(local, outer - inner, length, highest), start=1):
-        for axis in range(1, order + 1):
-            tensor = np.moveaxis(np.moveaxis(tensor, axis, -1) @ frame, -1, axis)
-        turned.append(tensor)
-    return tuple(turned)
+    return _turned(rectangle_derivatives(local, outer - inner, length, highest), frame)
 
 
 def _wall_derivatives(
@@ -162,7 +168,28 @@ def _wall_derivatives(
         _wall(points[chunk], radius, length / 2, start, end, highest, out[chunk])
 
     in_chunks(run, points.shape[0], THREAD)
-    return symmetric_tensors(out[:, 0], 1, highest), symmetric_tensors(out[:, 1], 1, highest)
+    # The kernel's axes are ρ and φ of the point, from whose azimuth its cosine and sine count.
+    azimuth = np.arctan2(points[:, 1], points[:, 0])
+    c, s, zero = np.cos(azimuth), np.sin(azimuth), np.zeros(len(points))
+    frame = np.stack([c, s, zero, -s, c, zero, zero, zero, zero + 1], axis=-1).reshape(-1, 3, 3)
+    cosine, sine = out[:, 0], out[:, 1]
+    c, s = c[:, None], s[:, None]
+    return (
+        _turned(symmetric_tensors(c * cosine - s * sine, 1, highest), frame),
+        _turned(symmetric_tensors(s * cosine + c * sine, 1, highest), frame),
+    )
+
+
+def _turned(tensors: tuple[Floats, ...], frame: Floats) -> tuple[Floats, ...]:
+    """Tensors (n, 3, …) from a frame whose axes are the rows of `frame`, (3, 3) or (n, 3, 3), to the ring's."""
+    result = []
+    for order, tensor in enumerate(tensors, start=1):
+        for axis in range(1, order + 1):
+            rows = np.moveaxis(tensor, axis, -1)
+            turned = np.reshape(rows, (len(rows), 3 ** (order - 1), 3)) @ frame
+            tensor = np.moveaxis(turned.reshape(rows.shape), -1, axis)
+        result.append(tensor)
+    return tuple(result)
 
 
 def _volume_derivatives(
@@ -224,8 +251,8 @@ def _section_nodes(gap: float) -> int:
 
 @kernel
 def _panel(a: float, last: float, eta: float) -> float:
-    """Half width of the panel that begins at `a`, with singularities at ± iη and 2π ± iη."""
-    width = min(WIDEST, _reach(-a, eta), _reach(2.0 * pi - a, eta))
+    """Half width of the panel that begins at `a`, with singularities at ± iη, and whole turns from there."""
+    width = min(WIDEST, _reach(-a, eta), _reach(2.0 * pi - a, eta), _reach(-2.0 * pi - a, eta))
     if a + 2.2 * width > last:
         width = min(width, 0.5 * (last - a))
     return width
@@ -233,28 +260,32 @@ def _panel(a: float, last: float, eta: float) -> float:
 
 @kernel
 def _wall(points: Floats, radius: float, half: float, start: float, end: float, highest: int, out: Floats) -> None:
-    """Components (n, 2, c) of the derivatives of S, cosine then sine."""
+    """Components (n, 2, c) of the derivatives of S in the frame of ρ, φ, z at each point, cosine then sine.
+
+    There the wall near the point has coordinates without rounding at the scale of the radius.
+    """
     size = out.shape[2]
     line = np.empty(19)
     for n in range(points.shape[0]):
         x, y, z = points[n, 0], points[n, 1], abs(points[n, 2])
         rho = sqrt(x * x + y * y)
+        gap = rho - radius
         above = max(z - half, 0.0)
-        # Azimuths count from the point's; the singularities within reach of the arc are at 0 and 2π.
-        origin = atan2(y, x)
-        a = start - origin
+        # Azimuths count from the point's, by whole turns such that the singularity at 0 is the arc's nearest.
+        a = start - atan2(y, x)
         a -= 2.0 * pi * np.floor(a / (2.0 * pi) + 0.5)
+        if a > 2.0 * pi - (a + (end - start)):
+            a -= 2.0 * pi
         last = a + (end - start)
-        eta = 2.0 * asinh(sqrt(((radius - rho) ** 2 + above * above) / (4.0 * radius * rho)))
-        eta = max(eta, 1e-12)
+        eta = max(2.0 * asinh(sqrt((gap * gap + above * above) / (4.0 * radius * rho))), 1e-12)
         for i in range(size):
             out[n, 0, i] = out[n, 1, i] = 0.0
         while a < last:
             width = _panel(a, last, eta)
             for node in range(NODES):
-                phi = origin + a + width * (1.0 + _ABSCISSAE[node])
-                c, s = cos(phi), sin(phi)
-                _line(x - radius * c, y - radius * s, z, half, highest, line)
+                phi = a + width * (1.0 + _ABSCISSAE[node])
+                c, s, versine = cos(phi), sin(phi), 2.0 * sin(phi / 2.0) ** 2
+                _line(gap + radius * versine, -radius * s, z, half, highest, line)
                 weight = _WEIGHTS[node] * width * radius / (4.0 * pi)
                 for i in range(size):
                     out[n, 0, i] += weight * c * line[i]

@@ -122,7 +122,7 @@ def test_segment_is_a_volume_of_dipoles(segment, reach):
 @pytest.mark.parametrize("cuts", [(-1.0, 0.3, 2.0, 4.0, 2 * np.pi - 1), (0.1, 2 * np.pi + 0.1)], ids=["cut", "whole"])
 @pytest.mark.parametrize(
     ("distance", "tolerances"),
-    [(1e-2, (1e-11, 1e-10, 1e-8)), (1e-3, (1e-10, 5e-8, 5e-5)), (0.3, (1e-12, 1e-11, 1e-9))],
+    [(1e-2, (1e-12, 1e-11, 1e-9)), (1e-3, (1e-12, 1e-10, 1e-7)), (0.3, (1e-13, 1e-12, 1e-11))],
 )
 def test_segments_of_a_whole_ring_sum_to_it(inner, cuts, distance, tolerances):
     """At `distance` (units) from the walls and the faces, inside and outside; off the cuts, whose parts cancel."""
