@@ -9,6 +9,7 @@ from magfem.geometry.cylinder_magnet import CylinderMagnet
 from magfem.geometry.cylinder_segment_magnet import CylinderSegmentMagnet
 from magfem.geometry.device import Device
 from magfem.geometry.disc_magnet import DiscMagnet
+from magfem.geometry.foil_ribbon import check_ribbon
 from magfem.geometry.geometry import Coil, Geometry, Magnets, check_device
 from magfem.geometry.grades import GRADES, Grade, grade_rows
 from magfem.geometry.halbach_array import HalbachArray
@@ -22,6 +23,7 @@ from magfem.geometry.magnetic_solids import MagneticSolids
 from magfem.geometry.material import AXIAL, DIAMETRIC, PermanentMagnet
 from magfem.geometry.meshed_magnets import MeshedMagnets
 from magfem.geometry.part import Part
+from magfem.geometry.planar_spiral_coil import PlanarSpiralCoil
 from magfem.geometry.racetrack_coil import RacetrackCoil
 from magfem.geometry.ring_magnet import RingMagnet
 from magfem.geometry.saddle_coil import SaddleCoil
@@ -60,6 +62,7 @@ __all__ = [
     "Part",
     "PermanentMagnet",
     "PlacedMagnet",
+    "PlanarSpiralCoil",
     "RacetrackCoil",
     "RingMagnet",
     "SaddleCoil",
@@ -70,6 +73,7 @@ __all__ = [
     "Wire",
     "card_text",
     "check_device",
+    "check_ribbon",
     "describe",
     "geometry_from_text",
     "grade_rows",

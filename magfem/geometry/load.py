@@ -21,6 +21,7 @@ from magfem.geometry.loop_coil import LoopCoil
 from magfem.geometry.magnet_assembly import MagnetAssembly
 from magfem.geometry.magnet_stack import MagnetStack
 from magfem.geometry.meshed_magnets import MeshedMagnets
+from magfem.geometry.planar_spiral_coil import PlanarSpiralCoil
 from magfem.geometry.racetrack_coil import RacetrackCoil
 from magfem.geometry.ring_magnet import RingMagnet
 from magfem.geometry.saddle_coil import SaddleCoil
@@ -45,6 +46,7 @@ KINDS: dict[str, Callable[[Table], Geometry]] = {
     LoopCoil.kind: LoopCoil.from_card,
     RacetrackCoil.kind: RacetrackCoil.from_card,
     SaddleCoil.kind: SaddleCoil.from_card,
+    PlanarSpiralCoil.kind: PlanarSpiralCoil.from_card,
 }
 """Reader of the whole card by the card's `kind`."""
 
