@@ -1,0 +1,135 @@
+"""Inductance of coils from edge elements on three meshes, extrapolated to elements of no size."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+from scipy.optimize import brentq
+
+from magfem.errors import InputError
+from magfem.fem.edge_elements import EdgeSolution, ribbon_loads, solve, winding_loads
+from magfem.mesh.coil_in_air import (
+    Ribbon,
+    Winding,
+    ribbon_widths,
+    ribbons_in_air,
+    windings_in_air,
+    windings_size,
+)
+from magfem.typing import Floats, Integers
+
+log = logging.getLogger("magfem")
+
+ORDER = 2.0
+"""The energy of lowest-order edge elements errs by the square of the field's error, which is of first order."""
+
+_WINDING_SIZES = (2.0, 2**0.5, 1.0)  # over the finest
+_RIBBON_ELEMENTS = (1, 2, 3)  # across a strip
+
+
+@dataclass(frozen=True)
+class EdgeInductance:
+    """Inductance matrix (c, c) H of circuits, extrapolated with the expected order from the two finer meshes.
+
+    error: (c, c) H, the larger of what the coarsest mesh changes in the extrapolation and a quarter of its step.
+    order: (c, c), as the three meshes show it; NaN where their values do not approach a limit.
+    values: (3, c, c) H on each mesh, coarsest first.  sizes: (3,) m.  edges, iterations: (3,).  seconds: of all.
+    """
+
+    inductance: Floats
+    error: Floats
+    order: Floats
+    values: Floats
+    sizes: Floats
+    edges: Integers
+    iterations: Integers
+    seconds: float
+
+
+def inductance_by_edge_elements(
+    circuits: Sequence[Sequence[Winding]] | Sequence[Sequence[Ribbon]], resolution: float = 1.0
+) -> EdgeInductance:
+    """Inductance matrix of circuits, each a sequence of coaxial windings, or each of closed ribbons, in series.
+
+    `resolution` 2 halves the elements of windings; ribbons have 1, 2 and 3 elements across, times `resolution`.
+    Raises InputError for what cannot be meshed within memory, MeshError, ConvergenceError.
+    """
+    parts = [part for circuit in circuits for part in circuit]
+    if not parts or not all(len(circuit) for circuit in circuits):
+        raise InputError("inductance by edge elements: every circuit needs at least one winding or ribbon")
+    if not resolution > 0:
+        raise InputError(f"inductance by edge elements: resolution must be positive, got {resolution:g}")
+    solid = [isinstance(part, Winding) for part in parts]
+    if any(solid) and not all(solid):
+        raise InputError("inductance by edge elements: windings and ribbons cannot be meshed together")
+    start = time.perf_counter()
+    if all(solid):
+        solids = cast(Sequence[Sequence[Winding]], circuits)
+        finest = windings_size(solids) / resolution
+        levels = [_of_windings(solids, finest * factor) for factor in _WINDING_SIZES]
+    else:
+        ribbons = cast(Sequence[Sequence[Ribbon]], circuits)
+        widest = max(float(ribbon_widths(ribbon).max()) for circuit in ribbons for ribbon in circuit)
+        across = [max(1, round(count * resolution)) for count in _RIBBON_ELEMENTS]
+        if len(set(across)) < len(across):
+            raise InputError(
+                f"inductance by edge elements: resolution must be at least 1 for ribbons, got {resolution:g}"
+            )
+        levels = [_of_ribbons(ribbons, count, widest / count) for count in across]
+    values, sizes, edges, iterations = (np.array(column) for column in zip(*levels, strict=True))
+    inductance, error = extrapolate(values, sizes)
+    order = np.vectorize(observed_order, signature="(n),(n)->()")(np.moveaxis(values, 0, -1), sizes)
+    return EdgeInductance(inductance, error, order, values, sizes, edges, iterations, time.perf_counter() - start)
+
+
+Level = tuple[Floats, float, int, int]  # inductance, size, edges, iterations
+
+
+def _of_windings(circuits: Sequence[Sequence[Winding]], size: float) -> Level:
+    mesh = windings_in_air(circuits, size)
+    return _level(solve(mesh, winding_loads(mesh, circuits)), size)
+
+
+def _of_ribbons(circuits: Sequence[Sequence[Ribbon]], across: int, size: float) -> Level:
+    mesh = ribbons_in_air(circuits, across)
+    return _level(solve(mesh, ribbon_loads(mesh)), size)
+
+
+def _level(solution: EdgeSolution, size: float) -> Level:
+    edges = solution.mesh.edges.shape[0]
+    log.info("edge elements: %d edges, %d iterations", edges, solution.iterations)
+    return solution.inductance, size, edges, solution.iterations
+
+
+def extrapolate(values: Floats, sizes: Floats, order: float = ORDER) -> tuple[Floats, Floats]:
+    """Limit (...) of values (3, ...) at decreasing element sizes (3,), and an estimate (...) of its error.
+
+    Richardson's: value(h) = limit + c h^order, from the last two; the estimate is the larger of the difference to
+    that from the first two and a quarter of the last step.
+    """
+    powers = sizes**order
+    first, last = (
+        values[n + 1] + (values[n + 1] - values[n]) * powers[n + 1] / (powers[n] - powers[n + 1]) for n in (0, 1)
+    )
+    return last, np.maximum(np.abs(last - first), np.abs(last - values[2]) / 4)
+
+
+def observed_order(values: Floats, sizes: Floats) -> float:
+    """The order p for which value(h) = limit + c h^p fits three values (3,) at sizes (3,); NaN where none in 0.1–8."""
+    first, last = values[0] - values[1], values[1] - values[2]
+    if first * last <= 0:
+        return float("nan")
+
+    def mismatch(p: float) -> float:
+        h = sizes**p
+        return float((h[0] - h[1]) / (h[1] - h[2]) - first / last)
+
+    low, high = 0.1, 8.0
+    if mismatch(low) * mismatch(high) > 0:
+        return float("nan")
+    return float(brentq(mismatch, low, high))
