@@ -30,6 +30,7 @@ SHARP = np.radians(25.0)
 MOST_FACETS = 110_000
 """What a mesh may have on its bodies: about a million unknowns."""
 
+_LONGEST = 1.5  # edge over the wanted element size at which an edge is halved: halves are then about that size
 _GROWTH = 2.75  # distance over which elements grow by their own size, away from rims
 _EDGES = np.array([[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]])
 
@@ -45,7 +46,7 @@ def mesh_in_air(surfaces: BodySurfaces, feature: float, radius: float, resolutio
     """
     feature = max(feature, radius / 8)
     rim, wall, outer = 0.05 * feature / resolution, min(0.13 / resolution, 0.2) * feature, 0.3 * radius / resolution
-    fine = refine(surfaces, _sizes(surfaces, rim, wall), MOST_FACETS)
+    fine = refine(surfaces, _sizes(surfaces, _LONGEST * rim, _LONGEST * wall), MOST_FACETS)
     ball, ball_facets = _sphere(BALL * radius, max(2, round(1.15 * BALL * radius / outer)))
     corners, numbered = np.unique(fine.facets[:, :3], return_inverse=True)
     points = np.vstack([fine.points[corners], ball])
@@ -208,7 +209,7 @@ def _fill(points: Points, regions: Regions, outer: float) -> tuple[Points, Integ
         _generate(gmsh)
         found, coordinates, _ = gmsh.model.mesh.getNodes()
         number = np.zeros(int(found.max()) + 1, dtype=np.int64)
-        rows = np.argsort(found, kind="stable")  # the surface's nodes have the lowest tags
+        rows = _first(points, np.asarray(coordinates).reshape(-1, 3))
         number[np.asarray(found, dtype=np.int64)[rows]] = np.arange(found.size)
         filled: Points = np.asarray(coordinates).reshape(-1, 3)[rows]
         cells, body = [], []
@@ -219,6 +220,14 @@ def _fill(points: Points, regions: Regions, outer: float) -> tuple[Points, Integ
             cells.append(inside)
             body.append(np.full(len(inside), index))
     return filled, np.concatenate(cells), np.concatenate(body)
+
+
+def _first(points: Points, nodes: Points) -> Integers:
+    """Order (n,) that puts those of `nodes` (n, 3) at `points` first: Gmsh numbers nodes anew."""
+    distance, place = cKDTree(nodes).query(points)
+    if distance.max() > 1e-12 * np.abs(points).max() or len(np.unique(place)) < len(points):
+        raise MeshError("Gmsh did not keep the bodies' surfaces")
+    return np.concatenate([place, np.setdiff1d(np.arange(len(nodes)), place)])
 
 
 def _generate(gmsh: Any) -> None:
