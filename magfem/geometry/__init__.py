@@ -21,10 +21,12 @@ from magfem.geometry.magnet_assembly import MagnetAssembly, PlacedMagnet
 from magfem.geometry.magnet_stack import MagnetStack
 from magfem.geometry.magnetic_solids import MagneticSolids
 from magfem.geometry.material import AXIAL, DIAMETRIC, PermanentMagnet
+from magfem.geometry.meander_coil import MeanderCoil
 from magfem.geometry.meshed_magnets import MeshedMagnets
 from magfem.geometry.part import Part
 from magfem.geometry.planar_spiral_coil import PlanarSpiralCoil
 from magfem.geometry.racetrack_coil import RacetrackCoil
+from magfem.geometry.rectangular_coil import RectangularCoil
 from magfem.geometry.ring_magnet import RingMagnet
 from magfem.geometry.saddle_coil import SaddleCoil
 from magfem.geometry.solenoid import Solenoid
@@ -58,12 +60,14 @@ __all__ = [
     "MagnetStack",
     "MagneticSolids",
     "Magnets",
+    "MeanderCoil",
     "MeshedMagnets",
     "Part",
     "PermanentMagnet",
     "PlacedMagnet",
     "PlanarSpiralCoil",
     "RacetrackCoil",
+    "RectangularCoil",
     "RingMagnet",
     "SaddleCoil",
     "Solenoid",

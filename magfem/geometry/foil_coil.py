@@ -18,7 +18,7 @@ from magfem.geometry.device import Device, header_from_card, length_text, two_di
 from magfem.geometry.foil_ribbon import Piece, Placed, Ribbon
 from magfem.geometry.leads import Leads
 from magfem.geometry.limits import InvalidValue, check_length, check_number, check_thickness
-from magfem.geometry.rolled import RolledRibbon
+from magfem.geometry.rolled import WIDEST, RolledRibbon
 from magfem.units import describe, format_quantity
 
 MOST_TURNS = 1000
@@ -266,6 +266,13 @@ class FoilCoil(Device):
                 f"of radius {format_quantity(self.rolled_radius, 'length')} "
                 f"({format_quantity(around, 'length')} around); its radius must exceed "
                 f"{format_quantity(x / (2 * pi), 'length')}",
+                "rolled.radius",
+            )
+        if self.track_width > WIDEST * self.rolled_radius:
+            raise InvalidValue(
+                f"{self.words}: radius must be at least {1 / WIDEST:.3g} times the track's width "
+                f"({format_quantity(self.track_width, 'length')}), "
+                f"got {format_quantity(self.rolled_radius, 'length')}",
                 "rolled.radius",
             )
         inside = self._depth + 0.5 * self.thickness

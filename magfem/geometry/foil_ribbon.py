@@ -23,7 +23,7 @@ TURNING = pi / 16
 angle)⁴/96 of the radius, 1e-6."""
 LONGEST = 12.0  # widths, an element at resolution 1
 FINEST = 0.05  # widths, the element next to a corner at resolution 1; the next ones double
-_UPRIGHT = 2.5  # widths from a corner, over which stations turn from the mitre to square
+_UPRIGHT = 1.25  # widths from a corner, over which stations turn from the mitre to square
 _SHARP = np.cos(np.radians(2.0))  # bends by less crowd no current
 AGREEMENT = 1e-4  # of the meshed area and length with their closed forms
 
@@ -103,7 +103,7 @@ class Straight:
         finest = [FINEST * width if joint.sharp else inf for joint in joints]
         marks = _refined(_graded(length, finest[0], finest[1], longest), resolution)
         slants = [float(joint.offset @ along) for joint in joints]
-        slant = _slants(marks, length, _UPRIGHT * max(self.widths), *slants)
+        slant = _slants(marks, length, max(self.widths), slants[0], slants[1])
         s, slant = _with_middles(marks)[:, None], _with_middles(slant)[:, None]
         half = 0.5 * (self.widths[0] + (self.widths[1] - self.widths[0]) * s / length)
         if not (np.diff(s + slant, axis=0) > 0).all() or not (np.diff(s - slant, axis=0) > 0).all():
@@ -228,7 +228,8 @@ def ribbon_size(stations: Stations, lead: bool = False) -> tuple[float, float]:
     chosen = stations.lead == lead
 
     def elements(rows: Floats) -> Floats:
-        return np.stack([rows[:-1:2], rows[1::2], rows[2::2]], axis=1)[chosen]
+        nodes: Floats = np.stack([rows[:-1:2], rows[1::2], rows[2::2]], axis=1)[chosen]
+        return nodes
 
     middle = elements(0.5 * (stations.left + stations.right))
     half = elements(0.5 * (stations.left - stations.right))
@@ -270,12 +271,14 @@ def _refined(marks: Floats, resolution: float) -> Floats:
     return np.interp(np.linspace(0, len(marks) - 1, count + 1), np.arange(len(marks)), marks)
 
 
-def _slants(marks: Floats, length: float, reach: float, first: float, last: float) -> Floats:
+def _slants(marks: Floats, length: float, width: float, first: float, last: float) -> Floats:
     """How far the left edge is ahead of the centreline at element ends, m: the mitres' share, fading out."""
-    if length < 2 * reach:
+    reaches = [max(_UPRIGHT * width, 2.2 * abs(mitre)) for mitre in (first, last)]
+    if length < sum(reaches):
         return first + (last - first) * marks / length
-    fading: Floats = first * np.clip(1 - marks / reach, 0, 1) + last * np.clip(1 - (length - marks) / reach, 0, 1)
-    return fading
+    begin, end = np.maximum(1 - marks / reaches[0], 0), np.maximum(1 - (length - marks) / reaches[1], 0)
+    slants: Floats = first * begin + last * end
+    return slants
 
 
 def _with_middles(ends: Floats) -> Floats:

@@ -20,9 +20,11 @@ from magfem.geometry.helmholtz_pair import HelmholtzPair
 from magfem.geometry.loop_coil import LoopCoil
 from magfem.geometry.magnet_assembly import MagnetAssembly
 from magfem.geometry.magnet_stack import MagnetStack
+from magfem.geometry.meander_coil import MeanderCoil
 from magfem.geometry.meshed_magnets import MeshedMagnets
 from magfem.geometry.planar_spiral_coil import PlanarSpiralCoil
 from magfem.geometry.racetrack_coil import RacetrackCoil
+from magfem.geometry.rectangular_coil import RectangularCoil
 from magfem.geometry.ring_magnet import RingMagnet
 from magfem.geometry.saddle_coil import SaddleCoil
 from magfem.geometry.solenoid import Solenoid
@@ -47,6 +49,8 @@ KINDS: dict[str, Callable[[Table], Geometry]] = {
     RacetrackCoil.kind: RacetrackCoil.from_card,
     SaddleCoil.kind: SaddleCoil.from_card,
     PlanarSpiralCoil.kind: PlanarSpiralCoil.from_card,
+    RectangularCoil.kind: RectangularCoil.from_card,
+    MeanderCoil.kind: MeanderCoil.from_card,
 }
 """Reader of the whole card by the card's `kind`."""
 

@@ -10,15 +10,18 @@ import numpy as np
 from magfem.geometry.circuit import Stations
 from magfem.typing import Floats
 
+WIDEST = 0.3  # of the radius, a strand that may be taken for flat across
+
 
 @dataclass(frozen=True)
 class RolledRibbon:
     """A flat ribbon on a cylinder: its x goes around the z axis from +x on, its y along z, its height outwards.
 
-    The plane z = 0 of the flat ribbon comes to lie at `radius` (m) and keeps its lengths.
+    The plane z = 0 of the flat ribbon comes to lie at `radius` (m), and lengths along it stay what they were.
 
     Across its width the ribbon stays flat, so that its width stays what it was. Where that leaves edges outside the
-    cylinder, the centreline lies as much inside as makes the mean square of the distance from the axis right.
+    cylinder, the centreline lies as much inside as makes the mean square of the distance from the axis right: area and
+    length are off by a few 1e-5 for strands of a fifth of the radius, and the error falls with the square of that.
     """
 
     ribbon: Callable[[float], Stations]
