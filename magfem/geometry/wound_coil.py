@@ -8,10 +8,10 @@ from typing import Any, ClassVar, Self
 
 from magfem.errors import InputError
 from magfem.geometry.card import Table
-from magfem.geometry.circuit import Circuit, Part
+from magfem.geometry.circuit import Circuit, CircuitPart
 from magfem.geometry.conductor import Conductor
 from magfem.geometry.device import Device, header_from_card, length_text
-from magfem.geometry.limits import check_length
+from magfem.geometry.limits import InvalidValue, check_length, check_number
 from magfem.geometry.winding_window import WindingWindow
 from magfem.geometry.wire import Wire
 from magfem.units import describe
@@ -26,6 +26,8 @@ class WoundCoil(Device):
     """
 
     optional: ClassVar[tuple[str, ...]] = ()
+    angles: ClassVar[tuple[str, ...]] = ()  # that a card's [dimensions] holds besides, rad
+    switches: ClassVar[tuple[str, ...]] = ()  # true or false, at the card's top; false when not stated
 
     turns: float
     layers: int | None = None  # None: not stated
@@ -41,6 +43,13 @@ class WoundCoil(Device):
         for key in self.optional:
             if getattr(self, key) is not None:
                 check_length(self.words, f"dimensions.{key}", getattr(self, key))
+        for key in self.switches:
+            if not isinstance(getattr(self, key), bool):
+                raise InvalidValue(
+                    f"{self.words}: {key} must be true or false, got {describe(getattr(self, key))}", key
+                )
+        for key in self.angles:
+            check_number(self.words, f"dimensions.{key}", getattr(self, key))
         self.check_shape(largest)
         self.window.check(self.words, self.turns, self.layers, self.wire)
         if self.layers is not None:
@@ -58,7 +67,7 @@ class WoundCoil(Device):
 
     @property
     @abstractmethod
-    def parts(self) -> tuple[Part, ...]:
+    def parts(self) -> tuple[CircuitPart, ...]:
         """The windings, in series."""
 
     @classmethod
@@ -68,7 +77,8 @@ class WoundCoil(Device):
             raise card.error(
                 f"{cls.kind.replace('_', ' ')}: iron cores are not supported yet, only coils in air", "core"
             )
-        values = header_from_card(card, "dimensions", "wire", "conductor")
+        values = header_from_card(card, "dimensions", "wire", "conductor", *cls.switches)
+        values |= {key: card.value(key) for key in cls.switches if key in card}
         with card.locating():
             return cls(
                 **values,
@@ -80,9 +90,10 @@ class WoundCoil(Device):
     @classmethod
     def dimensions_from_card(cls, dimensions: Table) -> dict[str, Any]:
         """The fields that a card's [dimensions] states. Raises CardError."""
-        dimensions.only(*cls.dimensions, *cls.optional, "turns", "layers")
+        dimensions.only(*cls.dimensions, *cls.optional, *cls.angles, "turns", "layers")
         values: dict[str, Any] = {key: dimensions.quantity(key, "length") for key in cls.dimensions}
         values |= {key: dimensions.quantity(key, "length") for key in cls.optional if key in dimensions}
+        values |= {key: dimensions.quantity(key, "angle") for key in cls.angles}
         values["turns"] = dimensions.number("turns")
         if "layers" in dimensions:
             values["layers"] = dimensions.number("layers")
@@ -92,13 +103,15 @@ class WoundCoil(Device):
         """The [dimensions] table that reads back to this."""
         lengths = (*self.dimensions, *(key for key in self.optional if getattr(self, key) is not None))
         table: dict[str, Any] = {key: length_text(getattr(self, key)) for key in lengths}
+        table |= {key: f"{getattr(self, key)!r} rad" for key in self.angles}
         table["turns"] = self.turns
         if self.layers is not None:
             table["layers"] = self.layers
         return table
 
     def tables(self) -> dict[str, Any]:
-        tables = {"dimensions": self.dimensions_table(), "conductor": self.conductor.table()}
+        tables: dict[str, Any] = {key: getattr(self, key) for key in self.switches}
+        tables |= {"dimensions": self.dimensions_table(), "conductor": self.conductor.table()}
         return tables | ({"wire": self.wire.table()} if self.wire.table() else {})
 
     @property
