@@ -31,6 +31,7 @@ from magfem.geometry.ring_magnet import RingMagnet
 from magfem.geometry.saddle_coil import SaddleCoil
 from magfem.geometry.solenoid import Solenoid
 from magfem.geometry.sphere_magnet import SphereMagnet
+from magfem.geometry.stator import Stator
 from magfem.geometry.wire import Wire
 from magfem.geometry.write import card_text, describe
 
@@ -73,6 +74,7 @@ __all__ = [
     "Solenoid",
     "SphereMagnet",
     "Stations",
+    "Stator",
     "SweptWinding",
     "Wire",
     "card_text",

@@ -9,6 +9,8 @@ from functools import cached_property
 from math import inf, pi
 from typing import Any, ClassVar, NamedTuple, Self
 
+import numpy as np
+
 from magfem.errors import InputError
 from magfem.fields.hull import BoxHull, CylinderHull, Hull
 from magfem.geometry.card import Table
@@ -170,7 +172,7 @@ class FoilCoil(Device):
         """The layers' tracks, turned about z by `angle` (rad)."""
         width, length = self.track_width, self.winding.length
         spacing = self.spacing or 0.0
-        lead_length = sum(piece.length for piece in self._closed if piece.lead)
+        lead_length = self._lead_length
         tracks = []
         for layer in range(self.layers):
             height = (layer - 0.5 * (self.layers - 1)) * spacing
@@ -217,6 +219,17 @@ class FoilCoil(Device):
         """One layer's track and its leads, flat."""
         turns = self.winding.pieces
         return (*turns, *self.leads.strips(turns[-1].ends[1], turns[0].ends[0], self._depth))
+
+    @property
+    def _lead_length(self) -> float:
+        """Of vias and return strip, m; around a cylinder the strip's level counts."""
+        leads = [piece for piece in self._closed if piece.lead]
+        if self.rolled_radius is None:
+            return sum(piece.length for piece in leads)
+        legs = np.array([piece.ends[1].place - piece.ends[0].place for piece in leads])
+        level = np.array([piece.ends[0].place[2] for piece in leads])
+        legs[:, 0] *= 1 + level / self.rolled_radius
+        return float(np.linalg.norm(legs, axis=1).sum())
 
     @property
     def _depth(self) -> float:

@@ -29,6 +29,7 @@ from magfem.geometry.ring_magnet import RingMagnet
 from magfem.geometry.saddle_coil import SaddleCoil
 from magfem.geometry.solenoid import Solenoid
 from magfem.geometry.sphere_magnet import SphereMagnet
+from magfem.geometry.stator import Stator
 from magfem.units import describe, quoted
 
 KINDS: dict[str, Callable[[Table], Geometry]] = {
@@ -51,6 +52,7 @@ KINDS: dict[str, Callable[[Table], Geometry]] = {
     PlanarSpiralCoil.kind: PlanarSpiralCoil.from_card,
     RectangularCoil.kind: RectangularCoil.from_card,
     MeanderCoil.kind: MeanderCoil.from_card,
+    Stator.kind: Stator.from_card,
 }
 """Reader of the whole card by the card's `kind`."""
 

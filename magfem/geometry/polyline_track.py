@@ -75,13 +75,9 @@ def spiral_points(outline: Floats, pitches: Floats, width: float, turns: int) ->
     level = (inward[side] * outline[side]).sum(axis=1) + 0.5 * width + turn * pitches[side]
     first, second = inward[side[:-1]], inward[side[1:]]
     cross = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
-    points = (
-        np.stack(
-            [level[:-1] * second[:, 1] - level[1:] * first[:, 1], level[1:] * first[:, 0] - level[:-1] * second[:, 0]],
-            axis=1,
-        )
-        / cross[:, None]
-    )
+    x = level[:-1] * second[:, 1] - level[1:] * first[:, 1]
+    y = level[1:] * first[:, 0] - level[:-1] * second[:, 0]
+    points: Floats = np.stack([x, y], axis=1) / cross[:, None]
     forward = (np.diff(points, axis=0) * along[side[1:-1]]).sum(axis=1)
     if (forward <= 0).any():
         raise CrampedTrack(int(np.argmax(forward <= 0)))
