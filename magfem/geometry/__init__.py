@@ -4,6 +4,7 @@ from magfem.geometry.block_magnet import BlockMagnet
 from magfem.geometry.body import Body
 from magfem.geometry.card import CardOrigin
 from magfem.geometry.circuit import Circuit, CoaxialWinding, FoilTrack, Stations, SweptWinding
+from magfem.geometry.coil_array import CoilArray
 from magfem.geometry.conductor import Conductor
 from magfem.geometry.cylinder_magnet import CylinderMagnet
 from magfem.geometry.cylinder_segment_magnet import CylinderSegmentMagnet
@@ -45,6 +46,7 @@ __all__ = [
     "Circuit",
     "CoaxialWinding",
     "Coil",
+    "CoilArray",
     "Conductor",
     "CylinderMagnet",
     "CylinderSegmentMagnet",

@@ -10,6 +10,7 @@ from magfem.errors import InputError
 from magfem.geometry.block_magnet import BlockMagnet
 from magfem.geometry.card import Table, parse_table, read_table
 from magfem.geometry.catalogue import resolve, short_path
+from magfem.geometry.coil_array import CoilArray
 from magfem.geometry.cylinder_magnet import CylinderMagnet
 from magfem.geometry.cylinder_segment_magnet import CylinderSegmentMagnet
 from magfem.geometry.disc_magnet import DiscMagnet
@@ -53,6 +54,7 @@ KINDS: dict[str, Callable[[Table], Geometry]] = {
     RectangularCoil.kind: RectangularCoil.from_card,
     MeanderCoil.kind: MeanderCoil.from_card,
     Stator.kind: Stator.from_card,
+    CoilArray.kind: CoilArray.from_card,
 }
 """Reader of the whole card by the card's `kind`."""
 

@@ -126,10 +126,11 @@ class Stator(Device):
         values = header_from_card(card, "dimensions", "inner", "outer", "conductor")
         dimensions = card.table("dimensions")
         dimensions.only(*cls.dimensions)
+        lengths: dict[str, Any] = {key: dimensions.quantity(key, "length") for key in cls.dimensions}
         with card.locating():
             return cls(
                 **values,
-                **{key: dimensions.quantity(key, "length") for key in cls.dimensions},
+                **lengths,
                 inner=Strands.from_card(card.table("inner")),
                 outer=Strands.from_card(card.table("outer")),
                 conductor=Conductor.from_card(card),
