@@ -195,12 +195,12 @@ def test_ribbon_lengths_converge_with_order_four() -> None:
 
 
 def test_racetrack_with_a_long_side_converges_to_two_wires() -> None:
-    """Halfway along a race of length L, two straight currents 2µ₀I/(2πd) each, less a share (d/L)²: elements short enough to add up."""
+    """Halfway along a race of length L: µ₀I/(2πd) from each straight, less a share (d/L)²."""
     thin = RacetrackCoil(
         inner_length=1.0, inner_width=20e-3, build=1e-3, height=1e-3, turns=10, wire=Wire(fill_factor=0.5)
     )
     (part,) = thin.parts
-    field = centre_field(part.layers(16.0))
+    field = centre_field(part.layers(16.0))  # elements short enough for the test's few points on each
     assert field[:2] == pytest.approx([0, 0], abs=1e-12)
     assert field[2] == pytest.approx(2 * MU_0 * 10 / (2 * np.pi * 10.5e-3), rel=5e-3)
 
