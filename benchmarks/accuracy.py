@@ -17,7 +17,7 @@ from tables import show
 
 import magfem
 from magfem.closed_form import ExactField
-from magfem.fem.solve import _discrete
+from magfem.fem.solve_magnets import solve_once
 from magfem.fields.field import Field
 from magfem.fields.norms import relative_errors
 from magfem.fields.terms import Terms, concatenate, frame_about, harmonics
@@ -73,7 +73,7 @@ def ladder() -> None:
 
 
 def _ring_truth(ring: Geometry, layers: Floats) -> Pair:
-    B, gradient = _discrete(ring, 2, 4.0).currents.jet(layers.reshape(-1, 3), 1)
+    B, gradient = solve_once(ring, 2, 4.0).currents.jet(layers.reshape(-1, 3), 1)
     return B.reshape(layers.shape), gradient.reshape(*layers.shape, 3)
 
 

@@ -368,7 +368,7 @@ def test_bad_input_from_a_shell(tmp_path: Path) -> None:
 
 
 def test_a_tolerance_out_of_reach_is_three(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules["magfem.fem.solve"].RESOLUTIONS, 2, (0.2, 1.0))
+    monkeypatch.setitem(sys.modules["magfem.fem.solve_magnets"].RESOLUTIONS, 2, (0.2, 1.0))
     assert "out of reach" in error_line(capsys, "solve", RING, "--tolerance", "1e-12", code=3)
 
 

@@ -47,7 +47,7 @@ def run(options: Namespace) -> int:
 
     geometry = load_geometry(options.card)
     dimension = choose_dimension(geometry, options.dimension)
-    check_resolution(options.resolution, dimension)
+    check_resolution(options.resolution, geometry, dimension)
     mesh = generate(geometry, dimension, options.resolution)
     write_mesh(mesh, path)
     cells, nodes = len(mesh.cells), len(mesh.points)

@@ -58,17 +58,17 @@ def _reference(model: FieldModel, shown: str, against: str) -> tuple[Field, str]
     geometry = _device(model, shown)
     if against == "exact":
         return _closed_form(geometry), "the closed form"
-    from magfem.fem.solve import RESOLUTIONS, check_resolution, choose_dimension, solve
+    from magfem.fem.solve import check_resolution, choose_dimension, resolutions, solve
 
     solver = model.provenance.get("solver") or {}
     if not isinstance(solver, dict):
         raise CardError("expected the settings of the model's solver", f"{shown}: provenance.solver")
     dimension = choose_dimension(geometry, solver.get("dimension"))
     own = solver.get("resolution", 1.0)
-    check_resolution(own, dimension)
-    resolution = min(2 * own, RESOLUTIONS[dimension][1])
+    check_resolution(own, geometry, dimension)
+    resolution = min(2 * own, resolutions(geometry, dimension)[1])
     finer = "twice the" if resolution == 2 * own else f"{resolution / own:g} times the"
-    name = f"finite elements at {finer} resolution (dimension {dimension}, resolution {resolution:g})"
+    name = f"finite elements at {finer} resolution ({'' if dimension is None else f'dimension {dimension}, '}resolution {resolution:g})"
     return solve(geometry, dimension, resolution), name
 
 
@@ -90,7 +90,7 @@ def _device(model: FieldModel, shown: str) -> Geometry:
 def _closed_form(geometry: Geometry) -> Field:
     from magfem.closed_form import exact
 
-    for body in geometry.bodies:
+    for body in getattr(geometry, "bodies", ()):
         recoil = body.material.recoil_permeability
         if recoil != 1.0:
             raise InputError(

@@ -195,3 +195,57 @@ def add_layers(
     A[0] += ax
     A[1] += ay
     A[2] += az
+
+
+@summing_kernel
+def add_patch_current(x: float, y: float, z: float, near: Floats, order: int, B: Floats, gradient: Floats) -> None:
+    """Add the elements `near` (6, q), places then strengths, as `add_current` does to order 0 or 1."""
+    bx = by = bz = 0.0
+    gxx = gxy = gxz = gyx = gyy = gyz = gzx = gzy = gzz = 0.0
+    for q in range(near.shape[1]):
+        rx, ry, rz = x - near[0, q], y - near[1, q], z - near[2, q]
+        inverse = 1.0 / max(rx * rx + ry * ry + rz * rz, 1e-60)
+        i3 = inverse * np.sqrt(inverse)
+        kx, ky, kz = near[3, q] * i3, near[4, q] * i3, near[5, q] * i3
+        cx, cy, cz = ky * rz - kz * ry, kz * rx - kx * rz, kx * ry - ky * rx
+        bx += cx
+        by += cy
+        bz += cz
+        ux, uy, uz = -3.0 * inverse * rx, -3.0 * inverse * ry, -3.0 * inverse * rz
+        gxx += cx * ux
+        gxy += cx * uy - kz
+        gxz += cx * uz + ky
+        gyx += cy * ux + kz
+        gyy += cy * uy
+        gyz += cy * uz - kx
+        gzx += cz * ux - ky
+        gzy += cz * uy + kx
+        gzz += cz * uz
+    B[0] += bx
+    B[1] += by
+    B[2] += bz
+    if order > 0:
+        gradient[0, 0] += gxx
+        gradient[0, 1] += gxy
+        gradient[0, 2] += gxz
+        gradient[1, 0] += gyx
+        gradient[1, 1] += gyy
+        gradient[1, 2] += gyz
+        gradient[2, 0] += gzx
+        gradient[2, 1] += gzy
+        gradient[2, 2] += gzz
+
+
+@summing_kernel
+def add_patch_layer(x: float, y: float, z: float, near: Floats, A: Floats) -> None:
+    """Add the elements `near` (6, q), places then strengths, as `add_layer` does to order 0."""
+    ax = ay = az = 0.0
+    for q in range(near.shape[1]):
+        rx, ry, rz = x - near[0, q], y - near[1, q], z - near[2, q]
+        i1 = 1.0 / np.sqrt(max(rx * rx + ry * ry + rz * rz, 1e-60))
+        ax += near[3, q] * i1
+        ay += near[4, q] * i1
+        az += near[5, q] * i1
+    A[0] += ax
+    A[1] += ay
+    A[2] += az

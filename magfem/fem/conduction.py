@@ -26,10 +26,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from magfem.errors import ConvergenceError
+from magfem.fem.coil_currents import CoilCurrents
 from magfem.fem.lattice_form import LatticeForm
-from magfem.fem.sheet_currents import SheetCurrents, patches
+from magfem.fem.sheet_currents import SheetCurrents
 from magfem.geometry.circuit import FoilTrack, Stations
-from magfem.typing import Floats, Jet, Points
+from magfem.mesh.lattice import lattice, patches, places_across
+from magfem.typing import Floats
 
 
 @dataclass(frozen=True)
@@ -66,52 +68,6 @@ class SheetConduction:
         return SheetCurrents(np.concatenate(sheets), np.concatenate([0.5 * weight * stream for weight in weights]))
 
 
-@dataclass(frozen=True)
-class SolidCurrents:
-    """The current of 1 A in a thick track.
-
-    faces: its surface, with σV in place of a stream function.  sheets: the same current on surfaces within it, for
-    integrals over the metal.
-    """
-
-    faces: SheetCurrents
-    sheets: SheetCurrents
-
-    def jet(self, points: Points, order: int) -> Jet:
-        """(B, gradient[, hessian]) at `points` (n, 3) m, per ampere."""
-        return self.faces.layer_jet(points, order)
-
-    def vector_potential(self, points: Points) -> Floats:
-        """A (n, 3) T·m per ampere."""
-        return self.sheets.vector_potential(points)
-
-    def elements(self) -> tuple[Floats, Floats]:
-        """Current elements: places (p, q, 3) m and strengths (p, q, 3) A·m."""
-        return self.sheets.elements()
-
-    @property
-    def moment(self) -> Floats:
-        """Dipole moment (3,) A·m² per ampere."""
-        return self.sheets.moment
-
-
-def lattice(stations: Stations, across: Floats, height: float = 0.0) -> Floats:
-    """Points (2n+1, 2m+1, 3) m of a ribbon, `height` (m) above its middle surface."""
-    middle = 0.5 * (stations.left + stations.right) + height * stations.normal
-    half = 0.5 * (stations.left - stations.right)
-    points: Floats = middle[:, None] + across[:, None] * half[:, None]
-    return points
-
-
-def places_across(elements: int, graded: bool) -> Floats:
-    """The (2m+1,) places across a ribbon of m elements, −1 to 1; graded ones crowd at the edges."""
-    share = np.linspace(-1.0, 1.0, elements + 1)
-    ends = np.sin(0.5 * np.pi * share) if graded else share
-    places = np.empty(2 * elements + 1)
-    places[::2], places[1::2] = ends, 0.5 * (ends[1:] + ends[:-1])
-    return places
-
-
 def solve_sheet(track: FoilTrack, resistivity: float, resolution: float, elements: int) -> SheetConduction:
     """The current in a foil track, `elements` (times the resolution) across its width.
 
@@ -140,13 +96,13 @@ def solve_sheet(track: FoilTrack, resistivity: float, resolution: float, element
 
 
 def solve_solid(
-    track: FoilTrack, resistivity: float, resolution: float, elements: int
-) -> tuple[SheetConduction, SolidCurrents, float]:
-    """The current in a thick track, its cross-section resolved: the foil's description, the currents, the resistance.
+    track: FoilTrack, sheet: SheetConduction, resistivity: float, resolution: float, elements: int
+) -> tuple[CoilCurrents, float]:
+    """The current in a thick track, its section resolved, and the resistance (Ω, from below).
 
-    The thickness gets half as many elements as the width. The resistance (Ω) is one from below.
+    sheet: the same track solved as a foil; its current, spread evenly through the thickness, serves for integrals over
+    the metal. The thickness gets half as many elements as the width.
     """
-    sheet = solve_sheet(track, resistivity, resolution, elements)
     through = places_across(max(2, round(0.5 * elements * resolution)), graded=True)
     levels = [lattice(sheet.stations, sheet.across, 0.5 * track.thickness * level) for level in through]
     points = np.stack(levels, axis=2)
@@ -165,7 +121,8 @@ def solve_solid(
         np.concatenate([patches(place) for place, _ in sides]),
         np.concatenate([patches(value) for _, value in sides]),
     )
-    return sheet, SolidCurrents(faces, sheet.currents(track.thickness, layers=5)), resistivity / conductance
+    within = sheet.currents(track.thickness, layers=5)
+    return CoilCurrents(faces=faces, within=within), resistivity / conductance
 
 
 def evenly_spread(stations: Stations, turns: float) -> SheetCurrents:

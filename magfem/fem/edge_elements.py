@@ -96,8 +96,13 @@ def shape_gradients(mesh: AirMesh) -> tuple[Floats, Floats]:
     """Gradients (e, 4, 3) of the corners' linear functions, 1/m, and volumes (e,) m³."""
     corners = mesh.points[mesh.tetrahedra]
     jacobian = corners[:, 1:] - corners[:, :1]
+    volume = np.abs(np.linalg.det(jacobian)) / 6
+    # Between coplanar triangles of a ribbon Gmsh may leave a flat tetrahedron: it holds no energy and is left out.
+    flat = volume < 1e-9 * np.abs(jacobian).max(axis=(1, 2)) ** 3
+    jacobian[flat], volume[flat] = np.eye(3), 0.0
     last = np.swapaxes(np.linalg.inv(jacobian), 1, 2)
-    return np.concatenate([-last.sum(axis=1, keepdims=True), last], axis=1), np.abs(np.linalg.det(jacobian)) / 6
+    last[flat] = 0.0
+    return np.concatenate([-last.sum(axis=1, keepdims=True), last], axis=1), volume
 
 
 def shape_curls(mesh: AirMesh) -> tuple[Floats, Floats]:

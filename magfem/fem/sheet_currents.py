@@ -15,20 +15,29 @@ far enough for it in both directions; else the patch is halved across the direct
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from magfem.compiled import kernel
 from magfem.constants import MU_0
-from magfem.fem.biot_savart import add_current, add_currents, add_layer, add_layers
+from magfem.fem.biot_savart import (
+    add_current,
+    add_currents,
+    add_layer,
+    add_layers,
+    add_patch_current,
+    add_patch_layer,
+)
 from magfem.threads import in_chunks
 from magfem.typing import Floats, Jet, Points
 
-_FAR_RULE, _FAR = (3, 2), (7.3, 28.0)
-"""Gauss points along u and v, and the least distance, in half-lengths, at which they integrate to about 1e-7."""
-_NEAR_RULE, _NEAR = (5, 4), (2.4, 3.7)
+_FAR_RULE, _FAR = (3, 2), (5.5, 18.0)
+"""Gauss points along u and v, and the least distance, in half-lengths, at which they integrate a patch to 1e-6."""
+_NEAR_RULE, _NEAR = (6, 3), (1.75, 6.0)
 _DEEPEST = 56  # halvings, of both directions together: a point on the sheet gets the mean of both sides
+_DEEPEST_LAYER = 22  # the same for 1/r, whose integral over what is left then is below 1e-7 of a patch's
 
 
 @dataclass(frozen=True)
@@ -42,6 +51,23 @@ class SheetCurrents:
     nodes: Floats
     stream: Floats
 
+    @classmethod
+    def none(cls) -> SheetCurrents:
+        """No current at all."""
+        return cls(np.empty((0, 9, 3)), np.empty((0, 9)))
+
+    @classmethod
+    def joined(cls, parts: Sequence[SheetCurrents]) -> SheetCurrents:
+        """All patches of several sheets."""
+        if not parts:
+            return cls.none()
+        return cls(np.concatenate([part.nodes for part in parts]), np.concatenate([part.stream for part in parts]))
+
+    @property
+    def count(self) -> int:
+        """Patches."""
+        return len(self.nodes)
+
     def jet(self, points: Points, order: int) -> Jet:
         """(B, gradient[, hessian]) at `points` (n, 3) m: ∫ K × r/r³ times µ0/4π."""
         return self._integrals(points, order, layer=False)
@@ -54,7 +80,7 @@ class SheetCurrents:
         """A (n, 3) T·m in the Coulomb gauge."""
         return self.layer_jet(points, 0)[0]
 
-    def elements(self, rule: tuple[int, int] = (4, 4)) -> tuple[Floats, Floats]:
+    def elements(self, rule: tuple[int, int] = (2, 5)) -> tuple[Floats, Floats]:
         """Current elements of a Gauss rule: places (p, q, 3) m and strengths K dS (p, q, 3) A·m."""
         u, v, weights = _tensor_rule(rule)
         shapes, du, dv = _shapes(u, v)
@@ -70,14 +96,6 @@ class SheetCurrents:
         total: Floats = 0.5 * np.cross(places, strengths).sum(axis=(0, 1))
         return total
 
-    def scaled(self, factor: float) -> SheetCurrents:
-        """The same patches with `factor` times the current."""
-        return SheetCurrents(self.nodes, factor * self.stream)
-
-    def moved(self, shift: Floats) -> SheetCurrents:
-        """The same currents, shifted by `shift` (3,) m."""
-        return SheetCurrents(self.nodes + shift, self.stream)
-
     def _integrals(self, points: Points, order: int, layer: bool) -> Jet:
         points = np.ascontiguousarray(points, dtype=float)
         count = points.shape[0]
@@ -87,8 +105,8 @@ class SheetCurrents:
         centre, half_u, half_v = self._extents()
         # One row for each coordinate, points of the rule before patches: the layout that vector units like.
         distant = np.concatenate([array.transpose(2, 1, 0) for array in self.elements(_FAR_RULE)]).copy()
-        places, strengths = self.elements(_NEAR_RULE)
-        rule = np.stack(_tensor_rule(_NEAR_RULE))
+        near = np.concatenate([array.transpose(0, 2, 1) for array in self.elements(_NEAR_RULE)], axis=1).copy()
+        (u, wu), (v, wv) = (_gauss(count) for count in _NEAR_RULE)
 
         def run(chunk: slice) -> None:
             _evaluate(
@@ -99,9 +117,8 @@ class SheetCurrents:
                 half_u,
                 half_v,
                 distant,
-                places,
-                strengths,
-                rule,
+                near,
+                (u, v, wu, wv),
                 order,
                 layer,
                 value[chunk],
@@ -119,19 +136,17 @@ class SheetCurrents:
         return middle, 0.5 * (nodes[:, 7] - nodes[:, 1]), 0.5 * (nodes[:, 5] - nodes[:, 3])
 
 
-def patches(lattice: Floats) -> Floats:
-    """The biquadratic patches (n·m, 9, …) of a lattice (2n+1, 2m+1, …)."""
-    n, m = lattice.shape[0] // 2, lattice.shape[1] // 2
-    i = 2 * np.arange(n)[:, None, None] + np.arange(3)[None, :, None]
-    columns = [lattice[i, 2 * j + np.arange(3)[None, None, :]].reshape(n, 9, *lattice.shape[2:]) for j in range(m)]
-    return np.ascontiguousarray(np.stack(columns, axis=1).reshape(n * m, 9, *lattice.shape[2:]))
-
-
 def _tensor_rule(rule: tuple[int, int]) -> tuple[Floats, Floats, Floats]:
     """Places u, v (q,) in [0, 1] and weights (q,) of a product of Gauss rules."""
-    (u, wu), (v, wv) = (np.polynomial.legendre.leggauss(n) for n in rule)
-    grid_u, grid_v = np.meshgrid(0.5 + 0.5 * u, 0.5 + 0.5 * v, indexing="ij")
-    return grid_u.ravel(), grid_v.ravel(), 0.25 * np.outer(wu, wv).ravel()
+    (u, wu), (v, wv) = (_gauss(count) for count in rule)
+    grid_u, grid_v = np.meshgrid(u, v, indexing="ij")
+    return grid_u.ravel(), grid_v.ravel(), np.outer(wu, wv).ravel()
+
+
+def _gauss(count: int) -> tuple[Floats, Floats]:
+    """Gauss's rule on [0, 1]."""
+    nodes, weights = np.polynomial.legendre.leggauss(count)
+    return 0.5 + 0.5 * nodes, 0.5 * weights
 
 
 def _shapes(u: Floats, v: Floats) -> tuple[Floats, Floats, Floats]:
@@ -161,9 +176,8 @@ def _evaluate(
     half_u: Floats,
     half_v: Floats,
     distant: Floats,
-    places: Floats,
-    strengths: Floats,
-    rule: Floats,
+    near: Floats,
+    rule: tuple[Floats, Floats, Floats, Floats],
     order: int,
     layer: bool,
     value: Floats,
@@ -174,17 +188,16 @@ def _evaluate(
     count = nodes.shape[0]
     share = np.empty(count)  # 1 for patches that the far rule serves, else 0
     far2 = np.empty(count)
-    reach_u = np.empty(count)
-    reach_v = np.empty(count)
-    radius = np.empty(count)
+    near2 = np.empty(count)
     for p in range(count):
-        reach_u[p] = np.sqrt((half_u[p] ** 2).sum())
-        reach_v[p] = np.sqrt((half_v[p] ** 2).sum())
-        radius[p] = reach_u[p] + reach_v[p]
-        # Measured from the middle, whose distance exceeds that of the patch by less than its radius.
-        far2[p] = (max(_FAR[0] * reach_u[p], _FAR[1] * reach_v[p]) + radius[p]) ** 2
+        reach_u, reach_v = np.sqrt((half_u[p] ** 2).sum()), np.sqrt((half_v[p] ** 2).sum())
+        # Measured from the middle, whose distance exceeds that of the patch by less than its half-diagonal.
+        radius = np.hypot(reach_u, reach_v)
+        far2[p] = (max(_FAR[0] * reach_u, _FAR[1] * reach_v) + radius) ** 2
+        near2[p] = (max(_NEAR[0] * reach_u, _NEAR[1] * reach_v) + radius) ** 2
     stack = np.empty((_DEEPEST + 2, 5))
-    work = np.empty((6, 3))
+    work = np.empty((5, 3))
+    leaf = np.empty((6, near.shape[2]))
     b = np.empty(3)
     g = np.zeros((3, 3))
     h = np.zeros((3, 3, 3))
@@ -204,16 +217,10 @@ def _evaluate(
             if share[p] == 1.0:
                 continue
             dx, dy, dz = x - centre[p, 0], y - centre[p, 1], z - centre[p, 2]
-            away = np.sqrt(dx * dx + dy * dy + dz * dz) - radius[p]
-            if away > _NEAR[0] * reach_u[p] and away > _NEAR[1] * reach_v[p]:
-                for q in range(places.shape[1]):
-                    at, K = places[p, q], strengths[p, q]
-                    if layer:
-                        add_layer(x - at[0], y - at[1], z - at[2], K[0], K[1], K[2], order, b, g, h)
-                    else:
-                        add_current(x - at[0], y - at[1], z - at[2], K[0], K[1], K[2], order, b, g, h)
+            if dx * dx + dy * dy + dz * dz > near2[p]:
+                _add_points(x, y, z, near[p], order, layer, b, g, h)
             else:
-                _add_close(x, y, z, nodes[p], stream[p], rule, order, layer, stack, work, b, g, h)
+                _add_close(x, y, z, nodes[p], stream[p], rule, order, layer, stack, work, leaf, b, g, h)
         for j in range(3):
             value[i, j] = MU_0 / (4.0 * np.pi) * b[j]
             if order > 0:
@@ -226,25 +233,55 @@ def _evaluate(
 
 
 @kernel
+def _add_points(
+    x: float,
+    y: float,
+    z: float,
+    near: Floats,
+    order: int,
+    layer: bool,
+    b: Floats,
+    g: Floats,
+    h: Floats,
+) -> None:
+    """Add the current elements `near` (6, q), places then strengths, of one patch or part of one."""
+    if order > 1 or (layer and order > 0):
+        for q in range(near.shape[1]):
+            rx, ry, rz = x - near[0, q], y - near[1, q], z - near[2, q]
+            if rx * rx + ry * ry + rz * rz == 0.0:
+                continue  # the point itself: its two sides cancel
+            if layer:
+                add_layer(rx, ry, rz, near[3, q], near[4, q], near[5, q], order, b, g, h)
+            else:
+                add_current(rx, ry, rz, near[3, q], near[4, q], near[5, q], order, b, g, h)
+    elif layer:
+        add_patch_layer(x, y, z, near, b)
+    else:
+        add_patch_current(x, y, z, near, order, b, g)
+
+
+@kernel
 def _add_close(
     x: float,
     y: float,
     z: float,
     nodes: Floats,
     stream: Floats,
-    rule: Floats,
+    rule: tuple[Floats, Floats, Floats, Floats],
     order: int,
     layer: bool,
     stack: Floats,
     work: Floats,
+    leaf: Floats,
     b: Floats,
     g: Floats,
     h: Floats,
 ) -> None:
     """One patch close to the point: halve it until every part is far enough for the near rule."""
-    middle, west, east, south, north, place = work[0], work[1], work[2], work[3], work[4], work[5]
+    middle, west, east, south, north = work[0], work[1], work[2], work[3], work[4]
     stack[0, :] = (0.0, 1.0, 0.0, 1.0, 0.0)
     height = 1
+    deepest = _DEEPEST_LAYER if layer and order == 0 else _DEEPEST
     while height > 0:
         height -= 1
         u0, u1, v0, v1 = stack[height, 0], stack[height, 1], stack[height, 2], stack[height, 3]
@@ -271,7 +308,7 @@ def _add_close(
             r = (x if i == 0 else y if i == 1 else z) - middle[i]
             d2 += (r - s * a - t * c) ** 2
         need_u, need_v = _NEAR[0] ** 2 * aa, _NEAR[1] ** 2 * bb
-        if d2 < max(need_u, need_v) and depth < _DEEPEST:
+        if d2 < max(need_u, need_v) and depth < deepest:
             if need_u >= need_v:
                 stack[height, :] = (u0, um, v0, v1, depth + 1)
                 stack[height + 1, :] = (um, u1, v0, v1, depth + 1)
@@ -280,18 +317,8 @@ def _add_close(
                 stack[height + 1, :] = (u0, u1, vm, v1, depth + 1)
             height += 2
             continue
-        area = (u1 - u0) * (v1 - v0)
-        for q in range(rule.shape[1]):
-            u, v = u0 + (u1 - u0) * rule[0, q], v0 + (v1 - v0) * rule[1, q]
-            w = rule[2, q] * area
-            kx, ky, kz = _current(u, v, nodes, stream, place)
-            rx, ry, rz = x - place[0], y - place[1], z - place[2]
-            if rx * rx + ry * ry + rz * rz == 0.0:
-                continue  # the point itself: its two sides cancel
-            if layer:
-                add_layer(rx, ry, rz, w * kx, w * ky, w * kz, order, b, g, h)
-            else:
-                add_current(rx, ry, rz, w * kx, w * ky, w * kz, order, b, g, h)
+        _fill_leaf(u0, u1, v0, v1, nodes, stream, rule, leaf)
+        _add_points(x, y, z, leaf, order, layer, b, g, h)
 
 
 @kernel
@@ -299,36 +326,49 @@ def _place(u: float, v: float, nodes: Floats, out: Floats) -> None:
     """The point that (u, v) maps to."""
     a = ((1 - u) * (1 - 2 * u), 4 * u * (1 - u), u * (2 * u - 1))
     b = ((1 - v) * (1 - 2 * v), 4 * v * (1 - v), v * (2 * v - 1))
-    out[:] = 0.0
-    for i in range(3):
-        for j in range(3):
-            weight = a[i] * b[j]
-            for k in range(3):
-                out[k] += weight * nodes[3 * i + j, k]
+    for k in range(3):
+        total = 0.0
+        for i in range(3):
+            total += a[i] * (b[0] * nodes[3 * i, k] + b[1] * nodes[3 * i + 1, k] + b[2] * nodes[3 * i + 2, k])
+        out[k] = total
 
 
 @kernel
-def _current(u: float, v: float, nodes: Floats, stream: Floats, place: Floats) -> tuple[float, float, float]:
-    """The current x_u ψ_v − x_v ψ_u at (u, v); `place` gets the point."""
-    a = ((1 - u) * (1 - 2 * u), 4 * u * (1 - u), u * (2 * u - 1))
-    b = ((1 - v) * (1 - 2 * v), 4 * v * (1 - v), v * (2 * v - 1))
-    da = (4 * u - 3, 4 - 8 * u, 4 * u - 1)
-    db = (4 * v - 3, 4 - 8 * v, 4 * v - 1)
-    px = py = pz = xu = yu = zu = xv = yv = zv = su = sv = 0.0
-    for i in range(3):
-        for j in range(3):
-            n = 3 * i + j
-            w, wu, wv = a[i] * b[j], da[i] * b[j], a[i] * db[j]
-            px += w * nodes[n, 0]
-            py += w * nodes[n, 1]
-            pz += w * nodes[n, 2]
-            xu += wu * nodes[n, 0]
-            yu += wu * nodes[n, 1]
-            zu += wu * nodes[n, 2]
-            xv += wv * nodes[n, 0]
-            yv += wv * nodes[n, 1]
-            zv += wv * nodes[n, 2]
-            su += wu * stream[n]
-            sv += wv * stream[n]
-    place[0], place[1], place[2] = px, py, pz
-    return xu * sv - xv * su, yu * sv - yv * su, zu * sv - zv * su
+def _fill_leaf(
+    u0: float,
+    u1: float,
+    v0: float,
+    v1: float,
+    nodes: Floats,
+    stream: Floats,
+    rule: tuple[Floats, Floats, Floats, Floats],
+    leaf: Floats,
+) -> None:
+    """Current elements (6, q) of a part of a patch: places x, and (x_u ψ_v − x_v ψ_u) times the weights."""
+    us, vs, wu, wv = rule
+    line = np.empty((3, 8))  # along u at one v: place, ∂/∂v of the place, ψ, ∂ψ/∂v at the three nodes
+    for j in range(vs.size):
+        v = v0 + (v1 - v0) * vs[j]
+        b0, b1, b2 = (1 - v) * (1 - 2 * v), 4 * v * (1 - v), v * (2 * v - 1)
+        d0, d1, d2 = 4 * v - 3, 4 - 8 * v, 4 * v - 1
+        for i in range(3):
+            for k in range(3):
+                p0, p1, p2 = nodes[3 * i, k], nodes[3 * i + 1, k], nodes[3 * i + 2, k]
+                line[i, k] = b0 * p0 + b1 * p1 + b2 * p2
+                line[i, 3 + k] = d0 * p0 + d1 * p1 + d2 * p2
+            s0, s1, s2 = stream[3 * i], stream[3 * i + 1], stream[3 * i + 2]
+            line[i, 6] = b0 * s0 + b1 * s1 + b2 * s2
+            line[i, 7] = d0 * s0 + d1 * s1 + d2 * s2
+        for i in range(us.size):
+            u = u0 + (u1 - u0) * us[i]
+            a0, a1, a2 = (1 - u) * (1 - 2 * u), 4 * u * (1 - u), u * (2 * u - 1)
+            c0, c1, c2 = 4 * u - 3, 4 - 8 * u, 4 * u - 1
+            su = c0 * line[0, 6] + c1 * line[1, 6] + c2 * line[2, 6]
+            sv = a0 * line[0, 7] + a1 * line[1, 7] + a2 * line[2, 7]
+            w = wu[i] * wv[j] * (u1 - u0) * (v1 - v0)
+            q = i * vs.size + j
+            for k in range(3):
+                leaf[k, q] = a0 * line[0, k] + a1 * line[1, k] + a2 * line[2, k]
+                xu = c0 * line[0, k] + c1 * line[1, k] + c2 * line[2, k]
+                xv = a0 * line[0, 3 + k] + a1 * line[1, 3 + k] + a2 * line[2, 3 + k]
+                leaf[3 + k, q] = w * (xu * sv - xv * su)

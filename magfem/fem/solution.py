@@ -12,13 +12,15 @@ from typing import Any
 import numpy as np
 
 from magfem.errors import CardError, InputError
+from magfem.fem.coil_solution import FORMAT as COIL_FORMAT
+from magfem.fem.coil_solution import CoilSolution, coil_solution
 from magfem.fem.discrete import Currents
 from magfem.fem.meridian_currents import MeridianCurrents
 from magfem.fem.surface_currents import SurfaceCurrents
 from magfem.fields.field import Evaluated, Unit
 from magfem.fields.region import Everywhere, Region, region_to_dict
 from magfem.files import read_json, write_folder, write_json
-from magfem.geometry import Geometry, describe, geometry_from_text
+from magfem.geometry import Coil, Magnets, describe, geometry_from_text
 from magfem.mesh.export import write_mesh
 from magfem.mesh.mesh import Mesh
 from magfem.typing import Floats, Jet, Points
@@ -40,7 +42,7 @@ class Solution(Evaluated):
     geometry: what was solved; `error` holds in its region.  settings: dimension and resolution.
     """
 
-    geometry: Geometry
+    geometry: Magnets
     currents: Currents
     mesh: Mesh
     potential: Floats  # (n,) A at the mesh's nodes
@@ -115,7 +117,7 @@ class Solution(Evaluated):
         )
 
 
-def load_solution(folder: str | Path) -> Solution:
+def load_solution(folder: str | Path) -> Solution | CoilSolution:
     """Read back what `Solution.save` wrote.
 
     Raises InputError when the folder is not a saved solution, CardError (file and reason) when it is not whole.
@@ -124,7 +126,7 @@ def load_solution(folder: str | Path) -> Solution:
         raise InputError(f'load_solution takes the folder of a solution: "runs/ring", got {words(folder)}')
     folder = Path(folder)
     summary = read_json(folder / "summary.json", "a solution's summary.json")
-    if not isinstance(summary, dict) or summary.get("format") != "magfem-solution":
+    if not isinstance(summary, dict) or summary.get("format") not in ("magfem-solution", COIL_FORMAT):
         raise InputError(f"this folder holds no saved solution [{folder}]")
     try:
         with open(folder / "fields.npz", "rb") as file, np.load(file) as stored:
@@ -132,6 +134,12 @@ def load_solution(folder: str | Path) -> Solution:
     except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
         raise InputError(f"the solution's fields cannot be read: {error} [{folder / 'fields.npz'}]") from None
     try:
+        if summary["format"] == COIL_FORMAT:
+            card = summary["device"]["card"]
+            coil = geometry_from_text(card["text"], card["path"])
+            if not isinstance(coil, Coil):
+                raise ValueError(f"its card describes no coil but a {coil.kind}")
+            return coil_solution(summary, arrays, coil)
         return _solution(summary, arrays)
     except CardError:
         raise
@@ -150,8 +158,11 @@ def _solution(summary: dict[str, Any], arrays: dict[str, Any]) -> Solution:
             raise ValueError(f"resolution and stated errors must be numbers, got {words(value)}")
     currents = {k.removeprefix("currents_"): v for k, v in arrays.items() if k.startswith("currents_")}
     card = summary["device"]["card"]
+    geometry = geometry_from_text(card["text"], card["path"])
+    if not isinstance(geometry, Magnets):
+        raise ValueError(f"its card describes no magnet but a {geometry.kind}")
     return Solution(
-        geometry=geometry_from_text(card["text"], card["path"]),
+        geometry=geometry,
         currents=SurfaceCurrents(**currents) if dimension == 3 else MeridianCurrents(**currents),
         mesh=Mesh(
             points=arrays["points"],

@@ -29,6 +29,11 @@ class Filaments:
     end: Floats
     current: Floats
 
+    @classmethod
+    def none(cls) -> Filaments:
+        """No current at all."""
+        return cls(np.empty((0, 3)), np.empty((0, 3)), np.empty(0))
+
     def jet(self, points: Points, order: int) -> Jet:
         """(B, gradient[, hessian]) at `points` (n, 3) m."""
         points = np.ascontiguousarray(points, dtype=float)

@@ -3,7 +3,7 @@
 from magfem.geometry.block_magnet import BlockMagnet
 from magfem.geometry.body import Body
 from magfem.geometry.card import CardOrigin
-from magfem.geometry.circuit import Circuit, CoaxialWinding, FoilTrack, Stations, SweptWinding
+from magfem.geometry.circuit import Circuit, CircuitPart, CoaxialWinding, FoilTrack, Stations, SweptWinding
 from magfem.geometry.coil_array import CoilArray
 from magfem.geometry.conductor import Conductor
 from magfem.geometry.cylinder_magnet import CylinderMagnet
@@ -44,6 +44,7 @@ __all__ = [
     "Body",
     "CardOrigin",
     "Circuit",
+    "CircuitPart",
     "CoaxialWinding",
     "Coil",
     "CoilArray",

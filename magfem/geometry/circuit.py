@@ -43,6 +43,7 @@ class FoilTrack:
     length: float
     area: float
     lead_length: float  # m, return strip and vias
+    curvature: float = 0.0  # 1/m, of the cylinder that the foil is rolled on
 
     @property
     def volume(self) -> float:
@@ -84,6 +85,7 @@ class SweptWinding:
     """
 
     layers: Callable[[float], tuple[tuple[Stations, float], ...]]
+    window: tuple[float, float]  # m, width of the layers, and build
     turns: float
     wire_length: float  # m, mean turn times turns
     wire_area: float  # m², of the metal in one turn's section
@@ -94,7 +96,7 @@ class SweptWinding:
         return self.wire_length * self.wire_area
 
 
-Part: TypeAlias = FoilTrack | CoaxialWinding | SweptWinding
+CircuitPart: TypeAlias = FoilTrack | CoaxialWinding | SweptWinding
 
 
 @dataclass(frozen=True)
@@ -102,7 +104,7 @@ class Circuit:
     """Parts in series, driven by one current."""
 
     name: str  # unique within its device
-    parts: tuple[Part, ...]
+    parts: tuple[CircuitPart, ...]
 
     @property
     def volume(self) -> float:

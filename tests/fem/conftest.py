@@ -8,7 +8,7 @@ from references import fourier_rotor
 
 import magfem
 from magfem.fem.solution import Solution
-from magfem.fem.solve import _discrete
+from magfem.fem.solve_magnets import solve_once
 from magfem.geometry import AXIAL, DIAMETRIC, CylinderMagnet, PermanentMagnet, RingMagnet
 from magfem.typing import Floats
 
@@ -81,7 +81,7 @@ def rotor_layers(rotor: CylinderMagnet) -> Floats:
 def ring_truth(ring: RingMagnet, ring_layers: Floats) -> tuple[Floats, Floats]:
     """B and gradient of the ring from 48 000 fourth-order unknowns: converged to 1e-7
     (test_axisymmetric_truth_is_converged), and its moment and energy to the dual formulation's."""
-    B, gradient = _discrete(ring, 2, 4.0).currents.jet(ring_layers.reshape(-1, 3), 1)
+    B, gradient = solve_once(ring, 2, 4.0).currents.jet(ring_layers.reshape(-1, 3), 1)
     return B.reshape(ring_layers.shape), gradient.reshape(*ring_layers.shape, 3)
 
 

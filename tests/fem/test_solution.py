@@ -108,7 +108,7 @@ def test_two_dimensions_need_axial_magnetisation(rotor):
 
 
 def test_tolerance_out_of_reach_says_so(ring, monkeypatch):
-    monkeypatch.setattr(import_module("magfem.fem.solve"), "RESOLUTIONS", {2: (0.25, 0.5)})
+    monkeypatch.setattr(import_module("magfem.fem.solve_magnets"), "RESOLUTIONS", {2: (0.25, 0.5)})
     with pytest.raises(ConvergenceError, match="out of reach"):
         solve(ring, resolution=0.25, tolerance=1e-10)
 
