@@ -12,8 +12,8 @@ from magfem.geometry.circuit import Stations
 from magfem.geometry.rounded_rectangle import RoundedRectangle
 from magfem.typing import Floats
 
-ACCURACY = 1e-5  # of a winding's field at the clearance, as far as the number of ribbons decides it, at resolution 1
-FEWEST, MOST = 2, 64  # ribbons, the latter at resolution 1
+ACCURACY = 1e-8  # of a winding's field at the clearance as far as the number of walls decides it, at resolution 1; 1e-4 at half
+FEWEST, MOST = 2, 64  # walls, the latter at resolution 1
 
 
 class Surface(Protocol):
