@@ -12,7 +12,7 @@ from magfem.geometry.circuit import Stations
 from magfem.geometry.rounded_rectangle import RoundedRectangle
 from magfem.typing import Floats
 
-ACCURACY = 1e-8  # of a winding's field at the clearance as far as the number of walls decides it, at resolution 1; 1e-4 at half
+ACCURACY = 1e-8  # of the field at the clearance, as far as walls decide it, at resolution 1; at half of it 1e-4
 FEWEST, MOST = 2, 64  # walls, the latter at resolution 1
 
 
