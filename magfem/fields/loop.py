@@ -1,4 +1,4 @@
-"""The circular current loop: B, gradient and hessian in one pass, compiled.
+"""The circular current loop: B, gradient and hessian in one pass, and the vector potential, compiled.
 
 The loop has radius a and lies in the plane z = 0 about the z axis. With s = x² + y², α = a² + s + z² and
 β² = 4a²s, everything is made of the positive integrals
@@ -28,7 +28,7 @@ import numpy as np
 
 from magfem.compiled import kernel
 from magfem.constants import MU_0
-from magfem.typing import Floats
+from magfem.typing import ArrayLike, Floats, Points, Vectors
 
 _SERIES_BELOW, _HESSIAN_SERIES_BELOW = 0.04, 0.12
 """Values of β²/α² below which the series are used: 12 terms reach rounding at the first, 22 at the second.
@@ -55,6 +55,66 @@ def _series(coefficients: Floats, terms: int, ratio: float) -> float:
     for n in range(terms - 1, -1, -1):
         total = total * ratio + coefficients[n]
     return total
+
+
+@kernel
+def complete_elliptic(complement: float) -> tuple[float, float]:
+    """Complete elliptic integrals (K, E) of parameter m = 1 − `complement`, by the arithmetic–geometric mean."""
+    g = sqrt(complement)
+    m, weight, total = 1.0, 0.5, 0.5 * (1.0 - complement)
+    for _ in range(12):
+        difference = 0.5 * (m - g)
+        m, g = 0.5 * (m + g), sqrt(m * g)
+        weight *= 2.0
+        total += weight * difference * difference
+        if difference < 1e-9 * m:
+            break
+    K = 0.5 * pi / m
+    return K, K * (1.0 - total)
+
+
+@kernel
+def potential_over_rho(rho: float, z: float, radius: float) -> float:
+    """A_φ/ρ of a loop per ampere, T/A, at distance `rho` from its axis and height `z`; infinite on the wire."""
+    a2 = radius * radius
+    alpha = a2 + rho * rho + z * z
+    beta2 = 4.0 * a2 * rho * rho
+    ratio = beta2 / (alpha * alpha)
+    if ratio < _SERIES_BELOW:
+        t1_32 = _series(_T1_32, 12, ratio) / (alpha * sqrt(alpha))
+    else:
+        far = (radius + rho) * (radius + rho) + z * z
+        near = (radius - rho) * (radius - rho) + z * z
+        K, E = complete_elliptic(near / far)
+        t1_32 = 8.0 / beta2 * (alpha * K / sqrt(far) - sqrt(far) * E)
+    return MU_0 / (4.0 * pi) * a2 * t1_32
+
+
+@kernel
+def _add_potentials(points: Points, radius: float, potential: Vectors) -> None:
+    for i in range(points.shape[0]):
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
+        factor = potential_over_rho(sqrt(x * x + y * y), z, radius)
+        potential[i, 0] -= y * factor
+        potential[i, 1] += x * factor
+
+
+def loop_vector_potential(points: ArrayLike, radius: float) -> Vectors:
+    """Vector potential of a circular current loop, per ampere, in the Coulomb gauge.
+
+    Parameters
+    ----------
+    points : (..., 3) m, loop frame: centre at the origin, normal +z.
+    radius : m, > 0.
+
+    Returns
+    -------
+    (..., 3) T·m/A. Infinite or NaN on the wire itself.
+    """
+    points = np.ascontiguousarray(points, dtype=float)
+    potential = np.zeros((points.size // 3, 3))
+    _add_potentials(points.reshape(-1, 3), radius, potential)
+    return potential.reshape(points.shape)
 
 
 @kernel
@@ -90,18 +150,7 @@ def add_loop(x: float, y: float, z: float, radius: float, current: float, order:
             power *= inverse * inverse
             t3_112 = power * _series(_T3_112, terms, ratio)
     else:
-        # Complete elliptic integrals K and E of modulus √(2β/(α+β)) by the arithmetic–geometric mean.
-        g = sqrt(near / far)
-        m, weight, total = 1.0, 0.5, 0.5 * (1.0 - near / far)
-        for _ in range(12):
-            difference = 0.5 * (m - g)
-            m, g = 0.5 * (m + g), sqrt(m * g)
-            weight *= 2.0
-            total += weight * difference * difference
-            if difference < 1e-9 * m:
-                break
-        K = 0.5 * pi / m
-        E = K * (1.0 - total)
+        K, E = complete_elliptic(near / far)
         root = sqrt(far)
         t1_32 = 8.0 / beta2 * (alpha * K / root - root * E)
         t1_52 = 8.0 / (3.0 * beta2 * root) * (alpha * E / near - K)
