@@ -8,6 +8,7 @@ the other, by Gauss rules on panels that shrink towards the edges of both window
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from math import hypot, inf, log, pi
 from typing import Literal
 
@@ -174,7 +175,7 @@ def _panels(
         return np.array([start]), np.ones(1)
     edges = np.unique([start, end, *(cut for cut in cuts if start < cut < end)])
     breaks = [edges]
-    for a, b in zip(edges[:-1], edges[1:], strict=True):
+    for a, b in pairwise(edges):
         width = b - a
         if gap > 2 * width:
             continue

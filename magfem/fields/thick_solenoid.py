@@ -36,7 +36,7 @@ MOST = 12  # Gauss points along one side of a cell
 TOLERANCE = 1e-12  # of the Gauss rules
 NEAR = 1.0  # of the section's longer side: nearer than this the route is by ends, the faster there
 FLAT = 1e-6  # of its thickness: a winding shorter than this is all cells, its two ends would cancel
-EDGE = 1e-9  # of the outer radius or the length: nearer to the plane of an end counts as this far
+EDGE = 1e-10  # of the outer radius or the length: nearer to an end of the winding counts as this far
 CORNER = 1e-6  # of the longer side: cells of the vector potential at the observer are not divided further
 DEEPEST = 400  # cells waiting on the stack: one bisection adds one, halving a side 50 times is beyond rounding
 
@@ -192,9 +192,10 @@ def _evaluate(
             loop[:] = 0.0
             beside = abs(z) <= half
             lower, upper = z + half, z - half
-            if abs(lower) < edge:
+            across = max(inner - rho, rho - outer) < edge  # on the end itself its derivatives jump
+            if across and abs(lower) < edge:
                 lower = edge if beside else -edge
-            if abs(upper) < edge:
+            if across and abs(upper) < edge:
                 upper = -edge if beside else edge
             sheet = ampere_turns / length
             G, P_z = _add_end(x, y, rho, lower, inner, outer, sheet, order, stack, loop)
@@ -329,9 +330,8 @@ def _sheet_end(rho: float, zeta: float, offset: float) -> float:
     far = (a + rho) * (a + rho) + zeta * zeta
     kc2 = (offset * offset + zeta * zeta) / far
     if gamma == 0.0:  # on the sheet: the mean of both sides
-        integral = complete_elliptic(kc2)[0]
-    else:
-        integral = _general_elliptic(sqrt(kc2), gamma * gamma, 1.0, gamma)
+        return MU_0 / (2.0 * pi) * zeta / sqrt(far) * complete_elliptic(kc2)[0]
+    integral = _general_elliptic(sqrt(kc2), gamma * gamma, 1.0, gamma)
     return MU_0 / pi * a / (a + rho) * zeta / sqrt(far) * integral
 
 
