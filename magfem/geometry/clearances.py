@@ -11,7 +11,7 @@ _ALONG = 6.0  # pitches along the track within which its parts are neighbours at
 
 
 def smallest_gap(stations: Stations, pitch: float) -> float:
-    """The smallest gap (m) between parts of a flat track's turns, 0 when they touch; `pitch` (m) when none is nearer.
+    """The smallest gap (m) between the turns of a flat track, 0 when they touch; at most `pitch` (m), turn to turn.
 
     Leads are left out; a track is not held against itself along six pitches.
     """

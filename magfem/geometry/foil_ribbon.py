@@ -8,11 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 from math import ceil, inf, pi
 from typing import NamedTuple, Protocol
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from magfem.errors import InputError, MeshError
 from magfem.geometry.circuit import FoilTrack, Stations
@@ -24,6 +26,7 @@ angle)⁴/96 of the radius, 1e-6."""
 LONGEST = 12.0  # widths, an element at resolution 1
 FINEST = 0.05  # widths, the element next to a corner at resolution 1; the next ones double
 _UPRIGHT = 1.25  # widths from a corner, over which stations turn from the mitre to square
+_NEARBY = 17  # samples of a curve
 _SHARP = np.cos(np.radians(2.0))  # bends by less crowd no current
 AGREEMENT = 1e-4  # of the meshed area and length with their closed forms
 
@@ -121,7 +124,7 @@ Path = Callable[[Floats], tuple[Floats, Floats]]
 class Curved:
     """A strip along a smooth curve in the plane z = 0, joined to others without corners.
 
-    span: the parameter at either end.  samples: enough steps of the parameter to see every bend.
+    span: the parameter at either end.  samples: steps of the parameter, some 64 from one bend to the next.
     """
 
     path: Path
@@ -155,6 +158,8 @@ class Curved:
         slopes = self.path(t)[1]
         speed = np.linalg.norm(slopes, axis=1)
         bending = np.abs(np.gradient(np.unwrap(np.arctan2(slopes[:, 1], slopes[:, 0])), t))
+        # Elements between bends must follow how the bending changes: they take what it is nearby.
+        bending = uniform_filter1d(maximum_filter1d(bending, _NEARBY), _NEARBY)
         density = np.maximum(bending / TURNING, speed / (LONGEST * self.width))
         density = np.maximum(density, np.abs(slopes[:, 0]) / (bend * TURNING))
         elements = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(t))])
@@ -178,13 +183,23 @@ class Ribbon:
             _joint(before.ends[1], after.ends[0])
             for before, after in zip((self.pieces[-1], *self.pieces[:-1]), self.pieces, strict=True)
         ]
+        return self._stations(resolution, [*joints, joints[0]])
+
+    def open(self, resolution: float) -> Stations:
+        """The stations of pieces whose ends do not meet, cut off square there."""
+        first, last = self.pieces[0].ends[0], self.pieces[-1].ends[1]
+        joints = [_joint(before.ends[1], after.ends[0]) for before, after in pairwise(self.pieces)]
+        return self._stations(resolution, [_joint(first, first), *joints, _joint(last, last)])
+
+    def _stations(self, resolution: float, joints: list[Joint]) -> Stations:
         found: list[tuple[Floats, Floats, Floats]] = []
         lead: list[Booleans] = []
-        for piece, pair in zip(self.pieces, zip(joints, (*joints[1:], joints[0]), strict=True), strict=True):
+        for piece, pair in zip(self.pieces, pairwise(joints), strict=True):
             rows = piece.rows(resolution, pair, self.bend)
-            found.append((rows[0][:-1], rows[1][:-1], rows[2][:-1]))
+            end = None if piece is self.pieces[-1] else -1
+            found.append((rows[0][:end], rows[1][:end], rows[2][:end]))
             lead.append(np.full(len(rows[0]) // 2, piece.lead))
-        centre, offset, normal = (np.concatenate([*rows, rows[0][:1]]) for rows in zip(*found, strict=True))
+        centre, offset, normal = (np.concatenate(rows) for rows in zip(*found, strict=True))
         return Stations(centre + offset, centre - offset, normal, np.concatenate(lead))
 
 
