@@ -22,8 +22,8 @@ from magfem.typing import ArrayLike, Booleans, Floats, Integers
 MOST_LOOPS = 120
 """Loops on one wall: more would make a model slower than it is worth."""
 
-MOST_PARAMETERS = 1000
-"""Free parameters of a model: fitting more takes minutes."""
+MOST_PARAMETERS = 200
+"""Loops in all: fitting more takes minutes and no longer helps."""
 
 
 @dataclass(frozen=True)

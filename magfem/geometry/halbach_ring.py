@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Self
 from magfem.errors import InputError
 from magfem.fields.hull import CylinderHull
 from magfem.geometry.card import Table
-from magfem.geometry.device import header_from_card, length_text, lengths_from_card
+from magfem.geometry.device import header_from_card, length_text, lengths_from_card, two_digits
 from magfem.geometry.limits import InvalidValue, check_thickness
 from magfem.geometry.magnetic_solids import MagneticSolids
 from magfem.geometry.material import DIAMETRIC, PermanentMagnet
@@ -102,6 +102,15 @@ class HalbachRing(MagneticSolids):
     def hull(self) -> CylinderHull:
         """The enclosing cylinder, from which distances are counted."""
         return CylinderHull(self.outer_diameter, self.length)
+
+    @property
+    def default_region(self) -> tuple[float, float]:
+        """Clearance and extent (m): as for all assemblies, but only as far out as the ring is wide.
+
+        The stray field falls off fast, and what several bodies leave of it is small against each one's field.
+        """
+        nearest, _ = super().default_region
+        return nearest, two_digits(max(self.outer_diameter, self.length, 1.5 * nearest))
 
     @property
     def ideal_field(self) -> float:

@@ -93,8 +93,11 @@ class MagnetStack(MagneticSolids):
 
     @property
     def default_region(self) -> tuple[float, float]:
-        """Clearance and extent (m): as for one magnet of its outline, but 1/8 of the diameter suffices on the axis."""
+        """Clearance and extent (m): 1/6 of the diameter, and 1.5 times the largest dimension, where loops model it.
+
+        Other than axial magnetisation is modelled by multipoles, as all assemblies are.
+        """
         if not self.axisymmetric:
             return super().default_region
-        nearest = max(self.outer_diameter / 8, self.length / 16)
+        nearest = max(self.outer_diameter / 6, self.total_length / 16)
         return two_digits(nearest), two_digits(1.5 * max(self.outer_diameter, self.total_length))

@@ -43,7 +43,7 @@ def generate(geometry: Magnets, dimension: int, resolution: float = 1.0) -> Mesh
         walls, rims = local_sizes(gmsh, dimension, body_of, wanted)
         if dimension == 3:
             check_count(gmsh, walls, rims, resolution)
-        set_size_field(gmsh, dimension, walls, rims, wanted.outer)
+        set_size_field(gmsh, dimension, walls, rims, wanted)
         gmsh.model.mesh.generate(2)
         if dimension == 3:
             _fill(gmsh)

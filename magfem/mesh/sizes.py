@@ -13,6 +13,10 @@ from magfem.geometry import Magnets
 _RIM_REACH, _SURFACE_REACH = 2.75, 3.0
 """How far the elements take to grow to their outer size, over the growth: slow growth matters more than small rims."""
 
+_SEVERAL_RIM, _SEVERAL_RIM_REACH = 0.07, 2.0
+"""In 3D, for several bodies: the largest rim size over the clearance of the device's region, and the reach from such
+rims. Between bodies fields nearly cancel, and an error at the rims is large against what is left of them."""
+
 MOST_UNKNOWNS = 1e6
 """What a 3D mesh may ask for: about 5 GB of memory and some minutes."""
 
@@ -30,12 +34,14 @@ class Wanted:
     """What a mesh should be like.
 
     bodies: sizes by body name.  outer: on the artificial boundary, m.  around: elements round a full turn of a curved
-    wall or rim at least, which is what shapes tightly curved ones.
+    wall or rim at least, which is what shapes tightly curved ones.  rim_reach: how far elements take to grow from the
+    rims to the outer size, over the growth.
     """
 
     bodies: Mapping[str, Sizes]
     outer: float
     around: float = 1.0
+    rim_reach: float = _RIM_REACH
 
 
 def element_sizes(geometry: Magnets, dimension: int, resolution: float) -> Wanted:
@@ -51,10 +57,15 @@ def element_sizes(geometry: Magnets, dimension: int, resolution: float) -> Wante
         features[body.name] = max(thickness, radius / (8 if dimension == 3 else 40))
     if dimension == 3:
         surface = min(0.13 / resolution, 0.2)  # coarser ones no longer converge
+        rims = {name: 0.05 * feature for name, feature in features.items()}
+        reach = _RIM_REACH
+        if len(rims) > 1 and max(rims.values()) > (largest := _SEVERAL_RIM * geometry.region.clearance):
+            rims, reach = {name: min(rim, largest) for name, rim in rims.items()}, _SEVERAL_RIM_REACH
         return Wanted(
-            {name: Sizes(0.05 * feature / resolution, surface * feature) for name, feature in features.items()},
+            {name: Sizes(rims[name] / resolution, surface * feature) for name, feature in features.items()},
             outer=0.3 * outer / resolution,
             around=max(18.0, 28.0 * resolution),
+            rim_reach=reach,
         )
     return Wanted(
         {name: Sizes(0.02 * feature / resolution, 0.12 * feature / resolution) for name, feature in features.items()},
@@ -110,29 +121,29 @@ def check_count(gmsh: Any, walls: Mapping[int, float], rims: Mapping[int, float]
 
 
 def set_size_field(
-    gmsh: Any, dimension: int, walls: Mapping[int, float], rims: Mapping[int, float], outer: float
+    gmsh: Any, dimension: int, walls: Mapping[int, float], rims: Mapping[int, float], wanted: Wanted
 ) -> None:
     """Small along rims (where the magnetisation ends in an edge), growing along the surface and into the air."""
     field = gmsh.model.mesh.field
 
-    def thresholds(kind: str, wanted: Mapping[int, float], growth: float) -> list[int]:
+    def thresholds(kind: str, sizes: Mapping[int, float], growth: float) -> list[int]:
         grown = []
-        for low in sorted(set(wanted.values())):
+        for low in sorted(set(sizes.values())):
             distance = field.add("Distance")
-            field.setNumbers(distance, kind, [tag for tag, size in wanted.items() if size == low])
+            field.setNumbers(distance, kind, [tag for tag, size in sizes.items() if size == low])
             field.setNumber(distance, "Sampling", 60)
             grown.append(field.add("Threshold"))
-            reach = growth * (outer - low)
-            for key, value in (("SizeMin", low), ("SizeMax", outer), ("DistMin", 0.0), ("DistMax", reach)):
+            reach = growth * (wanted.outer - low)
+            for key, value in (("SizeMin", low), ("SizeMax", wanted.outer), ("DistMin", 0.0), ("DistMax", reach)):
                 field.setNumber(grown[-1], key, value)
             field.setNumber(grown[-1], "InField", distance)
         return grown
 
     kinds = ("CurvesList", "SurfacesList") if dimension == 3 else ("PointsList", "CurvesList")
-    fields = thresholds(kinds[0], rims, _RIM_REACH) + thresholds(kinds[1], walls, _SURFACE_REACH)
+    fields = thresholds(kinds[0], rims, wanted.rim_reach) + thresholds(kinds[1], walls, _SURFACE_REACH)
     smallest = field.add("Min")
     field.setNumbers(smallest, "FieldsList", fields)
     field.setAsBackgroundMesh(smallest)
     for option in ("Mesh.MeshSizeExtendFromBoundary", "Mesh.MeshSizeFromPoints", "Mesh.MeshSizeFromCurvature"):
         gmsh.option.setNumber(option, 0)
-    gmsh.option.setNumber("Mesh.MeshSizeMax", outer)
+    gmsh.option.setNumber("Mesh.MeshSizeMax", wanted.outer)
