@@ -26,11 +26,11 @@ Conduction: TypeAlias = Literal["filament", "sheet", "solid", "winding"]
 RESOLUTIONS = (0.5, 4.0)
 """Smallest and largest resolution: below, bends are not resolved; above, memory runs out."""
 
-_STATED = 1.0
-"""Stated error over the difference between solutions at half and full resolution, whose errors fall at least fourfold
-from one to the next: what is more covers points that were not among the samples."""
+_STATED = 0.5
+"""Stated error over the difference between solutions on elements of full and of twice the size. Errors fall at least
+fourfold from one to the next, so that a third would do; what is more covers points that were not sampled."""
 _ROUNDING = 1e-9  # closed forms of windings are not stated to be better than this
-_ACROSS, _ACROSS_CORNERS = 2, 5  # elements across a track at resolution 1, and across one that turns corners
+_ACROSS, _ACROSS_CORNERS = 4, 8  # elements across a track at resolution 1, and across one that turns corners
 _FILAMENT_ERROR = 1e-5  # of the field at the clearance: tracks so narrow that this holds are filaments
 _GMD = 0.2235  # geometric mean distance within a rectangle over the sum of its sides (Maxwell; 0.22313 to 0.22369)
 
