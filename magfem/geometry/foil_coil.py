@@ -218,7 +218,7 @@ class FoilCoil(Device):
     def _closed(self) -> tuple[Piece, ...]:
         """One layer's track and its leads, flat."""
         turns = self.winding.pieces
-        return (*turns, *self.leads.strips(turns[-1].ends[1], turns[0].ends[0], self._depth))
+        return (*turns, *self.leads.strips(self.words, turns[-1].ends[1], turns[0].ends[0], self._depth))
 
     @property
     def _lead_length(self) -> float:

@@ -64,11 +64,11 @@ class Leads:
         """The strip's depth (m) under turns of `thickness` (m)."""
         return thickness + BELOW if self.depth is None else self.depth
 
-    def strips(self, end: Frame, start: Frame, depth: float) -> tuple[Straight, ...]:
-        """Via, return strip and via, from the `end` of the turns to their `start`."""
+    def strips(self, subject: str, end: Frame, start: Frame, depth: float) -> tuple[Straight, ...]:
+        """Via, return strip and via, from the `end` of the turns to their `start`. Raises InvalidValue."""
         down = np.array([0.0, 0.0, -depth])
         width = end.width if self.width is None else self.width
-        points = [np.append(point, -depth) for point in return_route(end, start, max(width, end.width))]
+        points = [np.append(point, -depth) for point in return_route(subject, end, start, max(width, end.width))]
         widths = [end.width, *[width] * (len(points) - 2), start.width]
         strips = [Straight(end.place, end.place + down, end.across, (end.width, end.width), lead=True)]
         for (first, last), pair in zip(pairwise(points), pairwise(widths), strict=True):
@@ -78,7 +78,7 @@ class Leads:
         return tuple(strips)
 
 
-def return_route(end: Frame, start: Frame, width: float) -> list[Floats]:
+def return_route(subject: str, end: Frame, start: Frame, width: float) -> list[Floats]:
     """The shortest polyline (n, 2) m in the plan that goes on from `end` and comes to `start` from behind.
 
     It has room for a strip of `width` (m) with mitred corners. Raises InvalidValue when there is none.
@@ -94,7 +94,11 @@ def return_route(end: Frame, start: Frame, width: float) -> list[Floats]:
     for route in sorted(routes, key=lambda points: sum(np.linalg.norm(b - a) for a, b in pairwise(points))):
         if _has_room(route, width):
             return route
-    raise InvalidValue("a foil coil's return strip finds no way from the inner to the outer end", "leads")
+    raise InvalidValue(
+        f"{subject}: a return strip {format_quantity(width, 'length')} wide finds no way from the end of the turns to "
+        "their beginning",
+        "leads.width",
+    )
 
 
 def _has_room(points: list[Floats], width: float) -> bool:
@@ -113,7 +117,7 @@ def _has_room(points: list[Floats], width: float) -> bool:
         if np.linalg.norm(leg) < first + last + 0.25 * width:
             return False
     lines = [LineString(pair) for pair in pairwise(points)]
-    return all(first.distance(second) > 1.3 * width for i, first in enumerate(lines) for second in lines[i + 2 :])
+    return all(first.distance(second) > 1.02 * width for i, first in enumerate(lines) for second in lines[i + 2 :])
 
 
 def _is_real(value: object) -> bool:

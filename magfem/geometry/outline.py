@@ -17,7 +17,13 @@ from magfem.geometry.foil_coil import Winding
 from magfem.geometry.foil_ribbon import Ribbon
 from magfem.geometry.limits import LONGEST, InvalidValue, check_length, check_number
 from magfem.geometry.polar_spiral import PolarSpiral, flower, narrowing
-from magfem.geometry.polyline_track import CrampedTrack, corner_radii, polyline_track, spiral_points
+from magfem.geometry.polyline_track import (
+    CrampedTrack,
+    corner_radii,
+    polyline_track,
+    spiral_points,
+    with_room_for_a_via,
+)
 from magfem.typing import Floats
 from magfem.units import describe, format_quantity, quantity, quoted
 
@@ -125,10 +131,10 @@ def check_window(request: Request, gap: float) -> None:
         if fitting > 2 * request.width
         else f"at most {max(0, int((0.5 * outer - 2 * request.width) / request.pitch))} turns fit at all"
     )
+    needed, space = (format_quantity(value, "length") for value in (wanted + request.width, window))
     raise InvalidValue(
         f"{request.subject}: the winding does not fit its window: {request.turns:g} turns of trace and gap take "
-        f"{format_quantity(wanted, 'length')}, between inner and outer radius are {format_quantity(window, 'length')}; "
-        f"{fits}",
+        f"{needed}, between inner and outer radius are {space}; {fits}",
         "dimensions.turns",
     )
 
@@ -173,8 +179,9 @@ class Flower:
         if gap < LEAST_GAP * request.gap:
             most = most_turns(request, lambda fewer: self.smallest_gap(fewer) >= LEAST_GAP * request.gap)
             raise InvalidValue(
-                f"{subject}: the winding does not fit its outline: the gap is {format_quantity(request.gap, 'length')}, "
-                f"turns come as near as {format_quantity(gap, 'length')}; at most {most} turns fit",
+                f"{subject}: the winding does not fit its outline: "
+                + (f"turns come as near as {format_quantity(gap, 'length')}" if gap else "its bends get too sharp")
+                + (f"; at most {most} turns fit" if most else "; not even one turn fits"),
                 "dimensions.turns",
             )
 
@@ -286,6 +293,7 @@ class Polygon:
         radii = corner_radii(points, len(corners), request.pitch, request.width, self.corner_radius)
         if self.corner_radius:
             points = _shortened(points, radii)
+        points = with_room_for_a_via(points, request.pitch, request.width, int(request.turns))
         pieces, length = polyline_track(points, request.width, radii)
         x, y = np.ptp(corners, axis=0)
         return Winding(pieces, length, (float(x), float(y)))

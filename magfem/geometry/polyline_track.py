@@ -39,7 +39,7 @@ def polyline_track(points: Floats, width: float, radii: Floats | None = None) ->
     halves = np.abs(np.tan(0.5 * turns))
     cut = radii * halves  # from a corner to where its arc begins
     taken = np.where(radii > 0, cut, 0.5 * width * halves)
-    spare = lengths - taken[:-1] - taken[1:] - np.where((radii[:-1] > 0) & (radii[1:] > 0), 0, SHORTEST_STRAND * width)
+    spare = lengths - taken[:-1] - taken[1:] - np.where((radii[:-1] > 0) | (radii[1:] > 0), 0, SHORTEST_STRAND * width)
     if (spare < -1e-9 * width).any():
         raise CrampedTrack(int(np.argmin(spare)))
     pieces: list[Piece] = []
@@ -82,6 +82,17 @@ def spiral_points(outline: Floats, pitches: Floats, width: float, turns: int) ->
     if (forward <= 0).any():
         raise CrampedTrack(int(np.argmax(forward <= 0)))
     return points
+
+
+def with_room_for_a_via(points: Floats, pitch: float, width: float, turns: int) -> Floats:
+    """A spiral's corners (n, 2) m, its last strand cut short when few turns lie between both ends.
+
+    The return strip needs four widths to get from one to the other. At most half of the strand is cut off.
+    """
+    last = points[-1] - points[-2]
+    length = float(np.linalg.norm(last))
+    cut = min(max(4 * width - turns * pitch, 0.0), 0.5 * length)
+    return np.concatenate([points[:-1], [points[-1] - cut / length * last]])
 
 
 def corner_radii(points: Floats, sides: int, pitch: float, width: float, radius: float) -> Floats:

@@ -10,13 +10,16 @@ import numpy as np
 
 from magfem.geometry.foil_coil import FoilCoil, Winding
 from magfem.geometry.limits import InvalidValue
-from magfem.geometry.polyline_track import polyline_track, spiral_points
+from magfem.geometry.polyline_track import CrampedTrack, polyline_track, spiral_points, with_room_for_a_via
 from magfem.units import format_quantity
 
 
 @dataclass(frozen=True, kw_only=True)
 class RectangularCoil(FoilCoil):
     """A rectangular spiral: longitudinal strands along y, transverse ones along x, corners mitred.
+
+    The track begins at the corner of least x and y and ends on a longitudinal strand, where the next turn would begin
+    (before that when there are so few turns that vias and return strip have no room).
 
     length, width: of the outer edge, along y and x. Strands of the same direction have gaps of their own.
     """
@@ -52,6 +55,13 @@ class RectangularCoil(FoilCoil):
                     "dimensions.turns",
                 )
         object.__setattr__(self, "turns", int(self.turns))
+        try:
+            _ = self.winding
+        except CrampedTrack:
+            raise InvalidValue(
+                f"{self.words}: the innermost strands of {self.turns} turns are too short for corners of their width",
+                "dimensions.turns",
+            ) from None
 
     def _taken(self, gap: float) -> float:
         """By the strands on both sides and a gap between the innermost, m."""
@@ -76,5 +86,6 @@ class RectangularCoil(FoilCoil):
         outline = np.array([[-x, -y], [x, -y], [x, y], [-x, y]])
         pitches = self.strand_width + np.array([self.transverse_gap, self.longitudinal_gap] * 2)
         points = spiral_points(outline, pitches, self.strand_width, int(self.turns))
+        points = with_room_for_a_via(points, float(pitches[0]), self.strand_width, int(self.turns))
         pieces, length = polyline_track(points, self.strand_width)
         return Winding(pieces, length, (self.width, self.length))
