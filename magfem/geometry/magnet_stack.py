@@ -93,11 +93,11 @@ class MagnetStack(MagneticSolids):
 
     @property
     def default_region(self) -> tuple[float, float]:
-        """Clearance and extent (m): 1/6 of the diameter, and 1.5 times the largest dimension, where loops model it.
+        """Clearance and extent (m): 1/4 of the diameter, and 1.5 times the largest dimension, where loops model it.
 
         Other than axial magnetisation is modelled by multipoles, as all assemblies are.
         """
         if not self.axisymmetric:
             return super().default_region
-        nearest = max(self.outer_diameter / 6, self.total_length / 16)
+        nearest = max(self.outer_diameter / 4, self.total_length / 16)
         return two_digits(nearest), two_digits(1.5 * max(self.outer_diameter, self.total_length))

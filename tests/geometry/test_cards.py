@@ -12,6 +12,7 @@ import pytest
 from magfem.errors import CardError, InputError
 from magfem.geometry import CylinderMagnet, RingMagnet, card_text, describe, geometry_from_text, load_geometry
 from magfem.geometry.catalogue import folder, names, resolve
+from magfem.geometry.load import KINDS
 
 RING = """\
 kind = "ring_magnet"
@@ -126,7 +127,7 @@ DIRECTION = "permanent magnet: magnetisation must be three numbers such as [0, 1
         ('kind = "ring_magnet"', "", 'missing key "kind"', "kind"),
         ("kind =", "kidn =", 'unknown key "kidn"; did you mean "kind"?', "kidn"),
         ('"ring_magnet"', '"ring_magnt"', 'unknown kind "ring_magnt"; did you mean "ring_magnet"?', "kind"),
-        ('"ring_magnet"', '"pump"', 'unknown kind "pump"; known: cylinder_magnet, ring_magnet', "kind"),
+        ('"ring_magnet"', '"pump"', f'unknown kind "pump"; known: {", ".join(KINDS)}', "kind"),
         ('"ring_magnet"', "3", "kind must be a text, got 3", "kind"),
         # unknown keys, at every level
         ("source =", "sorce =", 'unknown key "sorce"; did you mean "source"?', "sorce"),
