@@ -15,6 +15,7 @@ from itertools import pairwise
 from typing import Any, TypeAlias
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from magfem.errors import InputError, MeshError
 from magfem.mesh.session import gmsh_session
@@ -37,16 +38,13 @@ _EDGES_PER_CUBE = 18.0
 _EDGES_PER_POINT = 35.0
 """Edges over the ribbons' points."""
 
-STRETCH = 1.5
+STRETCH = 2.0
 """Length of a ribbon's elements along the strip over that across."""
-
-_RIBBON_GROWTH = 0.125
-"""On the outer sphere, over its radius, at one element across a ribbon and the growth of windings."""
 
 _CORNER = 0.3
 """Turns (rad) between two stations that are kept as corners."""
 
-_FIRST_TAG = 10_000_000  # of the ribbons' points: clear of those that Gmsh numbers itself
+_FIRST_TAG = 1000  # of the ribbons' points: clear of those of the sphere
 
 _EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
 _FACES = np.array([[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]])
@@ -162,7 +160,7 @@ def windings_in_air(circuits: Sequence[Sequence[Winding]], size: float, ball: fl
         gmsh.model.mesh.setSize(gmsh.model.getEntities(0), outer)
         inside = [part for piece in pieces[1:] for part in piece]
         gmsh.model.mesh.setSize(gmsh.model.getBoundary(inside, combined=False, oriented=False, recursive=True), size)
-        points, tetrahedra, _ = _fill(gmsh, outer)
+        points, tetrahedra = _fill(gmsh, outer)
     return _report(AirMesh(points, tetrahedra, centre, radius))
 
 
@@ -191,7 +189,7 @@ def ribbons_in_air(circuits: Sequence[Sequence[Ribbon]], across: int, ball: floa
     with gmsh_session() as gmsh:
         air = gmsh.model.occ.addSphere(0, 0, 0, 1)  # in units of the radius: Gmsh has absolute tolerances
         gmsh.model.occ.synchronize()
-        outer = min(0.3, _GROWTH * _RIBBON_GROWTH / across)
+        outer = max(0.3 / across, 0.06)
         gmsh.model.mesh.setSize(gmsh.model.getEntities(0), outer)
         foil = gmsh.model.addDiscreteEntity(2)
         tags = _FIRST_TAG + np.arange(everything.shape[0])
@@ -199,10 +197,12 @@ def ribbons_in_air(circuits: Sequence[Sequence[Ribbon]], across: int, ball: floa
         corners = np.concatenate([triangles for triangles, _ in parts])
         gmsh.model.mesh.addElementsByType(foil, 2, [], tags[corners].ravel())
         gmsh.model.mesh.embed(2, [foil], 3, air)
-        points, tetrahedra, number = _fill(gmsh, outer)
-    if (number[tags] < 0).any():
+        points, tetrahedra = _fill(gmsh, outer)
+    # Gmsh numbers the points anew, but does not move them.
+    distance, number = cKDTree(points).query((everything - centre) / radius)
+    if distance.max() > 1e-9:
         raise MeshError("the mesh of the air lost a part of the ribbons: strips must not touch or cross")
-    ribbons = tuple((number[tags][triangles], share) for triangles, share in parts)
+    ribbons = tuple((number[triangles], share) for triangles, share in parts)
     return _report(AirMesh(centre + radius * points, tetrahedra, centre, radius, ribbons))
 
 
@@ -235,14 +235,19 @@ def _strip(ribbon: Ribbon, across: int) -> Floats:
     straight = np.einsum("ki,ki->k", along[:-1], along[1:])
     corners = [0, *(1 + np.flatnonzero(straight < np.cos(_CORNER))), middle.shape[0] - 1]
     length = np.concatenate([[0.0], np.cumsum(step)])
+    share = np.linspace(0.0, 1.0, across + 1)
     stations = []
     for first, last in pairwise(corners):
         count = max(1, round((length[last] - length[first]) / (STRETCH * width / across)))
-        stations.append(np.linspace(length[first], length[last], count + 1)[:-1])
-    at = np.concatenate(stations)
-    sides = [np.stack([np.interp(at, length, side[:, i]) for i in range(3)], axis=-1) for side in (left, right)]
-    share = np.linspace(0.0, 1.0, across + 1)[:, None]
-    points: Floats = sides[0][:, None] * (1 - share) + sides[1][:, None] * share
+        at = np.linspace(length[first], length[last], count + 1)[:-1]
+        # Rectangles would have both diagonals in one sphere, which invites flat tetrahedra: lean them, but at corners.
+        lean = np.where(np.arange(count) > 0, 0.4 * (length[last] - length[first]) / count, 0.0)
+        stations.append(at[:, None] + lean[:, None] * share)
+    along_lines = np.concatenate(stations)
+    left, right = (
+        np.stack([np.interp(along_lines, length, side[:, i]) for i in range(3)], axis=-1) for side in (left, right)
+    )
+    points: Floats = left * (1 - share[:, None]) + right * share[:, None]
     return points
 
 
@@ -273,8 +278,8 @@ def _check_size(edges: float, size: float) -> None:
         )
 
 
-def _fill(gmsh: Any, outer: float) -> tuple[Floats, Integers, Integers]:
-    """Mesh all volumes, sizes growing from the surfaces: points, tetrahedra, and Gmsh's node tag -> row."""
+def _fill(gmsh: Any, outer: float) -> tuple[Floats, Integers]:
+    """Mesh all volumes, sizes growing from the surfaces: points (n, 3) and tetrahedra (e, 4)."""
     gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 1)
     gmsh.option.setNumber("Mesh.MeshSizeFromPoints", 1)
     gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", 0)
@@ -293,9 +298,7 @@ def _fill(gmsh: Any, outer: float) -> tuple[Floats, Integers, Integers]:
     row = np.full(int(tags.max()) + 1, -1, dtype=np.int64)
     row[np.asarray(tags, dtype=np.int64)] = np.arange(tags.size)
     points = np.asarray(coordinates).reshape(-1, 3)[row[used]]
-    number = np.full(row.size, -1, dtype=np.int64)
-    number[used] = np.arange(used.size)
-    return points, np.sort(numbered.reshape(cells.shape), axis=1), number
+    return points, np.sort(numbered.reshape(cells.shape), axis=1)
 
 
 def _report(mesh: AirMesh) -> AirMesh:
