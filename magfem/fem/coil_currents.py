@@ -27,7 +27,8 @@ class CoilCurrents:
     """The current of one circuit that carries 1 A.
 
     sheets: foils and layers of windings.  faces: surfaces of thick tracks, whose layer integral is B.
-    within: sheets inside those tracks, for integrals over the metal.  filaments: centrelines of tracks.
+    within: sheets that carry the same current as both, on coarser patches: enough for integrals over the metal.
+    filaments: centrelines of tracks.
     offset: (f, 3) m, from a filament to a place whose distance is the mean (geometric) one within its section.
     windings: (w, 6), inner radius, outer radius, length, centre on z (m), ampere-turns, radius of the wire (m).
     """
@@ -75,9 +76,8 @@ class CoilCurrents:
     def vector_potential(self, points: Points) -> Floats:
         """A (n, 3) T·m/A at `points` (n, 3) m, in the Coulomb gauge."""
         A = np.zeros_like(points, dtype=float)
-        for sheets in (self.sheets, self.within):
-            if sheets.count:
-                A += sheets.vector_potential(points)
+        if self.within.count:
+            A += self.within.vector_potential(points)
         if self.filaments.current.size:
             A += self.filaments.vector_potential(points)
         for inner, outer, length, centre, turns, _ in self.windings:
@@ -87,7 +87,7 @@ class CoilCurrents:
 
     def elements(self) -> tuple[Floats, Floats]:
         """Current elements that integrate smooth fields over the metal: places (e, 3) m, strengths (e, 3) A·m."""
-        parts = [_flat(sheets.elements()) for sheets in (self.sheets, self.within) if sheets.count]
+        parts = [_flat(self.within.elements())] if self.within.count else []
         parts += [_winding_elements(winding) for winding in self.windings]
         if self.filaments.current.size:
             wire = self.filaments
@@ -99,7 +99,7 @@ class CoilCurrents:
     @property
     def moment(self) -> Floats:
         """Dipole moment (3,) A·m²/A."""
-        moment: Floats = self.sheets.moment + self.within.moment + self.filaments.moment
+        moment: Floats = self.within.moment + self.filaments.moment
         for inner, outer, _, _, turns, _ in self.windings:
             moment[2] += turns * np.pi * (outer**2 + outer * inner + inner**2) / 3
         return moment

@@ -26,7 +26,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from magfem.errors import ConvergenceError
-from magfem.fem.coil_currents import CoilCurrents
 from magfem.fem.lattice_form import LatticeForm
 from magfem.fem.sheet_currents import SheetCurrents
 from magfem.geometry.circuit import FoilTrack, Stations
@@ -97,11 +96,11 @@ def solve_sheet(track: FoilTrack, resistivity: float, resolution: float, element
 
 def solve_solid(
     track: FoilTrack, sheet: SheetConduction, resistivity: float, resolution: float, elements: int
-) -> tuple[CoilCurrents, float]:
-    """The current in a thick track, its section resolved, and the resistance (Ω, from below).
+) -> tuple[SheetCurrents, float]:
+    """The surface of a thick track that carries 1 A, with σV for its stream function; the resistance (Ω, from below).
 
-    sheet: the same track solved as a foil; its current, spread evenly through the thickness, serves for integrals over
-    the metal. The thickness gets half as many elements as the width.
+    sheet: the same track solved as a foil, for its lattice. The thickness gets half as many elements as the width.
+    The layer integral of what is returned is B, see above.
     """
     through = places_across(max(2, round(0.5 * elements * resolution)), graded=True)
     levels = [lattice(sheet.stations, sheet.across, 0.5 * track.thickness * level) for level in through]
@@ -121,8 +120,7 @@ def solve_solid(
         np.concatenate([patches(place) for place, _ in sides]),
         np.concatenate([patches(value) for _, value in sides]),
     )
-    within = sheet.currents(track.thickness, layers=5)
-    return CoilCurrents(faces=faces, within=within), resistivity / conductance
+    return faces, resistivity / conductance
 
 
 def evenly_spread(stations: Stations, turns: float) -> SheetCurrents:

@@ -34,7 +34,7 @@ def inductance_matrix(circuits: Sequence[CoilCurrents]) -> Floats:
 
 
 def _coaxial(currents: CoilCurrents) -> bool:
-    return not (currents.sheets.count or currents.within.count or currents.filaments.current.size)
+    return not (currents.within.count or currents.filaments.current.size)
 
 
 def _windings(first: Floats, second: Floats) -> float:

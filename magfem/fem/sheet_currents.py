@@ -35,9 +35,9 @@ from magfem.typing import Floats, Jet, Points
 
 _FAR_RULE, _FAR = (3, 2), (5.5, 18.0)
 """Gauss points along u and v, and the least distance, in half-lengths, at which they integrate a patch to 1e-6."""
-_NEAR_RULE, _NEAR = (6, 3), (1.75, 6.0)
+_NEAR_RULE, _NEAR, _NEAR_LAYER = (6, 3), (1.75, 6.0), (1.0, 3.0)
 _DEEPEST = 56  # halvings, of both directions together: a point on the sheet gets the mean of both sides
-_DEEPEST_LAYER = 22  # the same for 1/r, whose integral over what is left then is below 1e-7 of a patch's
+_DEEPEST_LAYER = 18  # the same for 1/r, whose integral over what is left then is below 1e-7 of a patch's
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ class SheetCurrents:
         """A (n, 3) T·m in the Coulomb gauge."""
         return self.layer_jet(points, 0)[0]
 
-    def elements(self, rule: tuple[int, int] = (2, 5)) -> tuple[Floats, Floats]:
+    def elements(self, rule: tuple[int, int] = (2, 3)) -> tuple[Floats, Floats]:
         """Current elements of a Gauss rule: places (p, q, 3) m and strengths K dS (p, q, 3) A·m."""
         u, v, weights = _tensor_rule(rule)
         shapes, du, dv = _shapes(u, v)
@@ -194,7 +194,10 @@ def _evaluate(
         # Measured from the middle, whose distance exceeds that of the patch by less than its half-diagonal.
         radius = np.hypot(reach_u, reach_v)
         far2[p] = (max(_FAR[0] * reach_u, _FAR[1] * reach_v) + radius) ** 2
-        near2[p] = (max(_NEAR[0] * reach_u, _NEAR[1] * reach_v) + radius) ** 2
+        if layer and order == 0:
+            near2[p] = (max(_NEAR_LAYER[0] * reach_u, _NEAR_LAYER[1] * reach_v) + radius) ** 2
+        else:
+            near2[p] = (max(_NEAR[0] * reach_u, _NEAR[1] * reach_v) + radius) ** 2
     stack = np.empty((_DEEPEST + 2, 5))
     work = np.empty((5, 3))
     leaf = np.empty((6, near.shape[2]))
@@ -307,7 +310,10 @@ def _add_close(
             a, c = 0.5 * (east[i] - west[i]), 0.5 * (north[i] - south[i])
             r = (x if i == 0 else y if i == 1 else z) - middle[i]
             d2 += (r - s * a - t * c) ** 2
-        need_u, need_v = _NEAR[0] ** 2 * aa, _NEAR[1] ** 2 * bb
+        if layer and order == 0:  # 1/r is smoother
+            need_u, need_v = _NEAR_LAYER[0] ** 2 * aa, _NEAR_LAYER[1] ** 2 * bb
+        else:
+            need_u, need_v = _NEAR[0] ** 2 * aa, _NEAR[1] ** 2 * bb
         if d2 < max(need_u, need_v) and depth < deepest:
             if need_u >= need_v:
                 stack[height, :] = (u0, um, v0, v1, depth + 1)

@@ -125,7 +125,8 @@ def _solve_part(
         height, build = part.length, part.outer_radius - part.inner_radius
     else:
         layers = [evenly_spread(stations, turns) for stations, turns in part.layers(resolution)]
-        currents = CoilCurrents(sheets=SheetCurrents.joined(layers))
+        sheets = SheetCurrents.joined(layers)
+        currents = CoilCurrents(sheets=sheets, within=sheets)
         height, build = part.window
     # Turns a pitch apart leave a ripple in the field that falls as exp(−2π distance/pitch).
     pitch = (height * build / abs(part.turns)) ** 0.5
@@ -149,13 +150,17 @@ def _solve_track(
     across = _ACROSS_CORNERS if _has_corners(track.stations(resolution)) else _ACROSS
     sheet = solve_sheet(track, resistivity, resolution, across)
     bounds = sheet.bounds
-    if model == "solid":
-        currents, resistance = solve_solid(track, sheet, resistivity, resolution, across)
-        bounds = (resistance, resistance)
-    elif model == "filament":
+    if model == "filament":
         currents = _centreline(track, resolution)
     else:
-        currents = CoilCurrents(sheets=sheet.currents(track.thickness))
+        coarse = solve_sheet(track, resistivity, resolution / 2, _ACROSS)
+        if model == "solid":
+            faces, resistance = solve_solid(track, sheet, resistivity, resolution, across)
+            bounds = (resistance, resistance)
+            currents = CoilCurrents(faces=faces, within=coarse.currents(track.thickness, layers=5))
+        else:
+            within = coarse.currents(track.thickness)
+            currents = CoilCurrents(sheets=sheet.currents(track.thickness), within=within)
     return _Found(
         currents=currents,
         model=model,
