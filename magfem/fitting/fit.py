@@ -20,8 +20,8 @@ from magfem.fields.terms import Terms
 from magfem.fitting.families import FAMILIES, Candidate, dissertation_families, family_of
 from magfem.fitting.least_squares import LeastSquares, solve_least_squares
 from magfem.fitting.model import FieldModel, terms_to_list
-from magfem.fitting.recipe import Recipe
-from magfem.geometry import Geometry
+from magfem.fitting.recipe import Recipe, fittable
+from magfem.geometry import Coil, Geometry, Magnets
 from magfem.typing import Booleans, Floats, Points
 from magfem.version import __version__
 
@@ -118,8 +118,10 @@ def fit(source: Field, recipe: Recipe | None = None) -> FieldModel:
     )
 
 
-def _device(source: Field, recipe: Recipe) -> Geometry:
+def _device(source: Field, recipe: Recipe) -> Magnets:
     """The device that source and recipe speak of."""
+    if isinstance(source, Coil):
+        fittable(source)
     if not isinstance(source, Field):
         raise InputError("fit takes a field: a solution of magfem.solve, or any object with the Field interface")
     own: Geometry | None = getattr(source, "geometry", None)
@@ -127,11 +129,13 @@ def _device(source: Field, recipe: Recipe) -> Geometry:
         raise InputError(
             "cannot tell which device this field belongs to: fit(source, recipe) with a recipe that names it"
         )
+    if own is not None:
+        fittable(own)
     if own is not None and recipe.geometry is not None and own != recipe.geometry:
         raise InputError(f"the recipe is for {recipe.geometry.name}, but the field is that of {own.name}")
     geometry = recipe.geometry or own
     assert geometry is not None
-    return geometry
+    return fittable(geometry)
 
 
 def _sample(
@@ -148,7 +152,7 @@ def _sample(
     return Samples(points, B, gradient, layers)
 
 
-def _climb(geometry: Geometry, recipe: Recipe, samples: dict[str, Samples]) -> list[Fitted]:
+def _climb(geometry: Magnets, recipe: Recipe, samples: dict[str, Samples]) -> list[Fitted]:
     """Fit the family's candidates, from few parameters to many, until one is good enough."""
     family = recipe.family or family_of(geometry)
     tried: list[Fitted] = []

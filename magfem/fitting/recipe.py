@@ -10,7 +10,7 @@ from typing import Any
 
 from magfem.errors import InputError
 from magfem.fitting.families import FAMILIES
-from magfem.geometry import Geometry, load_geometry
+from magfem.geometry import Coil, Geometry, Magnets, load_geometry
 from magfem.geometry.card import Table, read_table
 from magfem.geometry.catalogue import resolve, short_path
 
@@ -24,7 +24,7 @@ class Recipe:
     dimension, resolution: how the command line solves the device first.
     """
 
-    geometry: Geometry | None = None
+    geometry: Magnets | None = None
     family: str | None = None
     target_B: float = 5e-4
     target_gradient: float = 5e-3
@@ -33,6 +33,8 @@ class Recipe:
     resolution: float = 1.0
 
     def __post_init__(self) -> None:
+        if self.geometry is not None:
+            fittable(self.geometry)
         for key in _RULES:
             if complaint := _complaint(key, getattr(self, key)):
                 raise InputError(f"{complaint}, got {getattr(self, key)!r}")
@@ -40,12 +42,22 @@ class Recipe:
             next(FAMILIES[self.family](self.geometry))  # refuses a device that the family is not made for
 
 
+def fittable(geometry: Geometry) -> Magnets:
+    """The device, as one that models are fitted to. Raises InputError for coils."""
+    if isinstance(geometry, Coil):
+        raise InputError(
+            f"{geometry.name}: models of coils are not fitted yet; the solution of magfem.solve is a field itself"
+        )
+    assert isinstance(geometry, Magnets)
+    return geometry
+
+
 def load_recipe(name_or_path: str | Path) -> Recipe:
     """A fit recipe of the catalogue by name, or the file at a path. Raises InputError, CardError."""
     where = ("fits", name_or_path, ".toml")
     table = read_table(resolve(*where), short_path(*where))
     table.only("device", "family", "seed", "target", "solve")
-    values: dict[str, Any] = {"geometry": load_geometry(_device_path(table, resolve(*where)))}
+    values: dict[str, Any] = {"geometry": fittable(load_geometry(_device_path(table, resolve(*where))))}
     if "family" in table:
         values["family"] = _checked(table, "family", table.text("family"))
     if "seed" in table:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import ctypes
 import os
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -16,8 +17,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import FancyArrowPatch, Patch
 
+from magfem.constants import MU_0
 from magfem.errors import MissingProgramError
-from magfem.geometry import Geometry
+from magfem.fields.hull import CylinderHull
+from magfem.geometry import Magnets
 from magfem.mesh.mesh import Mesh
 from magfem.report.figures.style import GREY, INK, NORTH, SKY, SOUTH, Picture, drawing, figure, length, png
 from magfem.report.surface import Surface
@@ -26,6 +29,7 @@ from magfem.typing import Floats, Points
 MILLI = 1e3
 _AZIMUTH, _ELEVATION = np.radians(-62.0), np.radians(24.0)  # of the eye
 _PIXELS = 1200
+_CANCELLED = 1e-3  # of the sum of the bodies' moments: a total below is none
 
 
 @dataclass(frozen=True)
@@ -52,27 +56,56 @@ def view(half: float) -> View:
     return View(right, np.cross(towards, right), towards, half)
 
 
-def device_picture(geometry: Geometry, surfaces: tuple[Surface, ...]) -> Picture:
-    """The device in its frame: north and south poles, moment, dimensions."""
+def device_picture(geometry: Magnets, surfaces: tuple[Surface, ...]) -> Picture:
+    """The device in its frame: north and south poles, magnetisations, moment, dimensions."""
+    many = len(surfaces) > 1
     reach = max(float(np.linalg.norm(surface.points, axis=1).max()) for surface in surfaces)
     seen = view(1.62 * reach)
-    image = _render(lambda plotter, pv: _add_device(plotter, pv, geometry, surfaces, reach), seen)
+    image = render(lambda plotter, pv: _add_device(plotter, pv, geometry, surfaces, reach), seen)
     with drawing():
         drawn = figure(4.6)
-        axes = _canvas(drawn.add_subplot(), image, seen)
+        axes = canvas(drawn.add_subplot(), image, seen)
         _dimension_lines(axes, geometry, seen, surfaces)
-        _moment_label(axes, geometry, seen, reach)
-        _axes_cross(axes, seen)
+        if _has_moment(geometry):
+            _moment_label(axes, geometry, seen, reach)
+        if many:
+            _magnetisations(axes, geometry, seen, surfaces)
+        axes_cross(axes, seen)
         handles = [Patch(color=NORTH, label="north pole"), Patch(color=SOUTH, label="south pole")]
         drawn.legend(handles=handles, loc="outside lower right", ncols=2, handlelength=1.0)
         content = png(drawn)
-    poles = "the north pole is red, the south pole blue, an arrow shows the magnetic moment"
+    poles = "the north poles are red, the south poles blue" if many else "the north pole is red, the south pole blue"
+    arrows = ["white arrows show how each magnet is magnetised"] if many else []
+    arrows += ["the arrow m is the direction of the magnetic moment"] if _has_moment(geometry) else []
     return Picture(
         "device",
         content,
-        f"{geometry.name} drawn in three dimensions; {poles}.",
-        "To scale, in its own frame; the arrow m is the direction of the magnetic moment.",
+        f"{geometry.name} drawn in three dimensions; {poles}; {'; '.join(arrows)}.",
+        f"To scale, in its own frame; {'; '.join(arrows)}.",
     )
+
+
+def _has_moment(geometry: Magnets) -> bool:
+    """Whether the magnets' moments do not cancel."""
+    total = sum(float(np.linalg.norm(b.material.remanence_vector)) * b.volume for b in geometry.bodies) / MU_0
+    return float(np.linalg.norm(geometry.moment)) > _CANCELLED * total
+
+
+def _magnetisations(axes: Axes, geometry: Magnets, seen: View, surfaces: tuple[Surface, ...]) -> None:
+    """An arrow over the middle of every body, along its magnetisation; a ring with a dot or cross along the view."""
+    materials = {body.name: body.material for body in geometry.bodies}
+    for surface in surfaces:
+        low, high = surface.points.min(axis=0), surface.points.max(axis=0)
+        direction = unit(np.array(materials[surface.name].magnetisation, dtype=float))
+        spread = surface.points @ direction
+        half = 0.32 * float(np.ptp(spread)) * direction
+        # Before the body, so that the arrow stands over the wall that is seen.
+        middle = (low + high) / 2
+        start, end = (seen.project(middle + side * half) * MILLI for side in (-1, 1))
+        for colour, width in ((INK, 3.6), ("white", 1.8)):
+            arrow = FancyArrowPatch(start, end, arrowstyle="-|>", mutation_scale=9, shrinkA=0, shrinkB=0)
+            arrow.set(color=colour, linewidth=width)
+            axes.add_patch(arrow)
 
 
 def mesh_pictures(mesh: Mesh) -> tuple[Picture, Picture]:
@@ -97,7 +130,7 @@ def _front(half: float, centre: Floats) -> View:
 
 
 def _mesh_picture(mesh: Mesh, name: str, seen: View, caption: str) -> Picture:
-    image = _render(lambda plotter, pv: _add_cut(plotter, pv, mesh), seen)
+    image = render(lambda plotter, pv: _add_cut(plotter, pv, mesh), seen)
     x, _, z = seen.centre * MILLI
     half = seen.half * MILLI
     with drawing():
@@ -110,7 +143,7 @@ def _mesh_picture(mesh: Mesh, name: str, seen: View, caption: str) -> Picture:
         return Picture(name, png(drawn), f"Mesh of {len(mesh.cells)} tetrahedra, cut open at y = 0.", caption)
 
 
-def _render(fill: Any, seen: View) -> Any:
+def render(fill: Callable[[Any, Any], None], seen: View) -> Any:
     """Draw with VTK what `fill(plotter, pyvista)` adds; an image (n, n, 3) uint8."""
     pv = _pyvista()
     plotter = pv.Plotter(off_screen=True, window_size=(_PIXELS, _PIXELS), lighting="none")
@@ -162,7 +195,7 @@ def _cannot_render(reason: str) -> MissingProgramError:
     )
 
 
-def _add_device(plotter: Any, pv: Any, geometry: Geometry, surfaces: tuple[Surface, ...], reach: float) -> None:
+def _add_device(plotter: Any, pv: Any, geometry: Magnets, surfaces: tuple[Surface, ...], reach: float) -> None:
     materials = {body.name: body.material for body in geometry.bodies}
     for surface in surfaces:
         shell = _polydata(pv, surface)
@@ -182,12 +215,15 @@ def _add_device(plotter: Any, pv: Any, geometry: Geometry, surfaces: tuple[Surfa
                 specular_power=12,
             )
         edges = shell.extract_feature_edges(35, boundary_edges=False, manifold_edges=False, non_manifold_edges=False)
-        plotter.add_mesh(edges, color="#2a2f34", line_width=3, lighting=False)
+        if edges.n_points:  # a ball has none
+            plotter.add_mesh(edges, color="#2a2f34", line_width=3, lighting=False)
+    if not _has_moment(geometry):
+        return
     start, size = _arrow(geometry, reach)
     plotter.add_mesh(
         pv.Arrow(
             start=tuple(start),
-            direction=tuple(_unit(geometry.moment)),
+            direction=tuple(unit(geometry.moment)),
             scale=size,
             shaft_radius=0.025,
             tip_radius=0.07,
@@ -203,12 +239,13 @@ def _add_device(plotter: Any, pv: Any, geometry: Geometry, surfaces: tuple[Surfa
     )
 
 
-def _arrow(geometry: Geometry, reach: float) -> tuple[Floats, float]:
+def _arrow(geometry: Magnets, reach: float) -> tuple[Floats, float]:
     """Where the moment's arrow starts, and its length: from inside the device to well outside."""
-    return -0.15 * reach * _unit(geometry.moment), 1.6 * reach
+    return -0.15 * reach * unit(geometry.moment), 1.6 * reach
 
 
-def _unit(vector: Floats) -> Floats:
+def unit(vector: Floats) -> Floats:
+    """The direction of a vector (3,)."""
     return vector / np.linalg.norm(vector)
 
 
@@ -229,7 +266,7 @@ def _add_cut(plotter: Any, pv: Any, mesh: Mesh) -> None:
         )
 
 
-def _canvas(axes: Axes, image: Any, seen: View) -> Axes:
+def canvas(axes: Axes, image: Any, seen: View) -> Axes:
     """The rendered image with axes in mm of picture coordinates, not shown."""
     limit = seen.half * MILLI
     axes.imshow(image, extent=(-limit, limit, -limit, limit), interpolation="lanczos")
@@ -238,13 +275,13 @@ def _canvas(axes: Axes, image: Any, seen: View) -> Axes:
     return axes
 
 
-def _dimension_lines(axes: Axes, geometry: Geometry, seen: View, surfaces: tuple[Surface, ...]) -> None:
-    """The dimensions of a body of revolution, as on a drawing; a scale bar for everything else."""
+def _dimension_lines(axes: Axes, geometry: Magnets, seen: View, surfaces: tuple[Surface, ...]) -> None:
+    """The dimensions of a tube or cylinder, as on a drawing; a scale bar for everything else."""
     lengths = {key: getattr(geometry, key) for key in geometry.dimensions}
     outer = lengths.get("outer_diameter", lengths.get("diameter"))
     gap = 0.1 * seen.half * MILLI
-    if outer is None or "length" not in lengths:
-        _scale_bar(axes, seen)
+    if outer is None or "length" not in lengths or geometry.hull != CylinderHull(outer, lengths["length"]):
+        scale_bar(axes, seen)
         return
     half = lengths["length"] / 2
     flat = np.concatenate([seen.project(surface.points) for surface in surfaces]) * MILLI
@@ -262,7 +299,7 @@ def _dimension_lines(axes: Axes, geometry: Geometry, seen: View, surfaces: tuple
     _dimension(axes, (beside, bottom[1]), (beside, top[1]), text, shift=(5 * way, 0))
     for x, y in (bottom, top):
         axes.plot([x + way * 0.2 * gap, beside + way * 0.3 * gap], [y, y], color=GREY, linewidth=0.7)
-    if "inner_diameter" in lengths:
+    if lengths.get("inner_diameter"):
         inner = lengths["inner_diameter"]
         ends = [seen.project(side * inner / 2 * seen.right + [0, 0, half]) * MILLI for side in (-1, 1)]
         high = flat[:, 1].max() + gap
@@ -295,22 +332,21 @@ def _dimension(
     )
 
 
-def _scale_bar(axes: Axes, seen: View) -> None:
+def scale_bar(axes: Axes, seen: View) -> None:
+    """A length to measure by, below the device."""
     limit = seen.half * MILLI
     size = max(s for p in range(-3, 4) for s in (10.0**p, 2 * 10.0**p, 5 * 10.0**p) if s <= 0.6 * limit)
-    axes.plot(
-        [-0.95 * limit, -0.95 * limit + size], [-0.9 * limit] * 2, color=INK, linewidth=2.5, solid_capstyle="butt"
-    )
-    axes.text(-0.95 * limit + size / 2, -0.88 * limit, length(size / MILLI), ha="center", va="bottom")
+    axes.plot([-size / 2, size / 2], [-0.92 * limit] * 2, color=INK, linewidth=2.5, solid_capstyle="butt")
+    axes.text(0, -0.9 * limit, length(size / MILLI), ha="center", va="bottom")
 
 
-def _moment_label(axes: Axes, geometry: Geometry, seen: View, reach: float) -> None:
+def _moment_label(axes: Axes, geometry: Magnets, seen: View, reach: float) -> None:
     start, size = _arrow(geometry, reach)
-    x, y = seen.project(start + 1.04 * size * _unit(geometry.moment)) * MILLI
+    x, y = seen.project(start + 1.04 * size * unit(geometry.moment)) * MILLI
     axes.annotate("m", (x, y), (4, 2), textcoords="offset points", fontstyle="italic", fontweight="bold")
 
 
-def _axes_cross(axes: Axes, seen: View) -> None:
+def axes_cross(axes: Axes, seen: View) -> None:
     """The directions of x, y and z in the lower left corner."""
     limit = seen.half * MILLI
     origin = np.array([-0.82, -0.8]) * limit

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from magfem.geometry import Geometry
+from magfem.geometry import Magnets, MeshedMagnets
 from magfem.mesh.session import gmsh_session
 from magfem.typing import Floats, Integers, Points
 
@@ -41,8 +41,10 @@ class Surface:
         return np.stack(ends, axis=1)
 
 
-def surfaces(geometry: Geometry) -> tuple[Surface, ...]:
+def surfaces(geometry: Magnets) -> tuple[Surface, ...]:
     """One surface for every body of the device."""
+    if isinstance(geometry, MeshedMagnets):
+        return _facets(geometry)
     found = []
     with gmsh_session() as gmsh:
         bodies = geometry.build(gmsh.model.occ)
@@ -58,6 +60,17 @@ def surfaces(geometry: Geometry) -> tuple[Surface, ...]:
             faces = gmsh.model.getBoundary([(3, tag) for tag in volumes], oriented=False)
             nodes = [gmsh.model.mesh.getElementsByType(2, tag)[1] for _, tag in faces]
             triangles = index[np.concatenate(nodes).astype(np.int64)].reshape(-1, 3)
-            used, numbered = np.unique(triangles, return_inverse=True)
-            found.append(Surface(name, points[used], numbered.reshape(triangles.shape)))
+            found.append(_surface(name, points, triangles))
     return tuple(found)
+
+
+def _facets(geometry: MeshedMagnets) -> tuple[Surface, ...]:
+    """An external mesh: its facets by their corners."""
+    shared = geometry.surfaces
+    return tuple(_surface(name, shared.points, shared.of_body(index)[:, :3]) for index, name in enumerate(shared.names))
+
+
+def _surface(name: str, points: Points, triangles: Integers) -> Surface:
+    """A surface with only the points that its triangles use."""
+    used, numbered = np.unique(triangles, return_inverse=True)
+    return Surface(name, points[used], numbered.reshape(triangles.shape))

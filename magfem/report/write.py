@@ -8,7 +8,7 @@ from pathlib import Path
 
 from magfem.errors import InputError
 from magfem.files import write_bytes, write_text
-from magfem.geometry import Geometry
+from magfem.geometry import Coil, Geometry, Magnets
 
 log = logging.getLogger("magfem")
 
@@ -33,12 +33,21 @@ def write_report(target: str | os.PathLike[str], path: str | os.PathLike[str], p
 
 
 def show_picture(geometry: Geometry, path: str | os.PathLike[str]) -> Path:
-    """Draw a device in 3D, with its poles, moment and dimensions, to a PNG; nothing is solved."""
+    """Draw a device to a PNG: magnets with poles, moment and dimensions, coils with the way of the current.
+
+    Nothing is solved.
+    """
+    from magfem.report.coil_scenes import coil_picture
     from magfem.report.scenes import device_picture
     from magfem.report.surface import surfaces
 
     target = _writable(path, (".png",))
-    write_bytes(target, device_picture(geometry, surfaces(geometry)).png)
+    if isinstance(geometry, Coil):
+        picture = coil_picture(geometry)
+    else:
+        assert isinstance(geometry, Magnets)
+        picture = device_picture(geometry, surfaces(geometry))
+    write_bytes(target, picture.png)
     return target
 
 

@@ -24,6 +24,7 @@ BLUE, ORANGE, GREEN, PURPLE = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
 SKY, YELLOW = "#56B4E9", "#E69F00"
 INK, GREY, PALE = "#1f2429", "#6b737b", "#d9dde1"
 NORTH, SOUTH = "#C8442E", "#2F6DB3"
+COPPER, LEAD, EDGE = "#C77B3B", "#E9C9A4", "#6B3F1A"  # of coils: turns, leads, their outlines
 MODEL, FEM, EXACT, MEASURED = BLUE, INK, GREEN, ORANGE
 RIVALS = (ORANGE, PURPLE, YELLOW, GREEN, SKY)
 DASHES = ("--", "-.", (0, (1, 1)), (0, (5, 1, 1, 1, 1, 1)), (0, (8, 2)))  # of the rivals
