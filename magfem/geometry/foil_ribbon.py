@@ -20,9 +20,9 @@ from magfem.errors import InputError, MeshError
 from magfem.geometry.circuit import FoilTrack, Stations
 from magfem.typing import Booleans, Floats
 
-TURNING = pi / 16
+TURNING = pi / 24
 """Most turning of a curved element at resolution 1: a parabola through its three stations leaves an arc by (half the
-angle)⁴/96 of the radius, 1e-6."""
+angle)⁴/32 of the radius, 6e-7."""
 LONGEST = 12.0  # widths, an element at resolution 1
 FINEST = 0.05  # widths, the element next to a corner at resolution 1; the next ones double
 _UPRIGHT = 1.25  # widths from a corner, over which stations turn from the mitre to square
