@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -40,7 +42,7 @@ def box(split: tuple[int, int] = (1, 1)) -> SheetCurrents:
     """The four walls of a block magnetised along z, exactly; each divided as `split` says."""
     corners = 0.5 * SIZE[:2] * np.array([[1, -1], [1, 1], [-1, 1], [-1, -1], [1, -1]])
     walls = []
-    for start, end in zip(corners[:-1], corners[1:], strict=True):
+    for start, end in pairwise(corners):
         u = np.linspace(0, 1, 2 * split[0] + 1)[:, None, None]
         z = np.linspace(-0.5, 0.5, 2 * split[1] + 1)[None, :, None] * SIZE[2]
         plan = np.broadcast_to(start + u * (end - start), (u.size, z.size, 2))
