@@ -17,7 +17,8 @@ from magfem.fem.refinement import peak_bytes, refine
 from magfem.fem.sheet_currents import SheetCurrents
 from magfem.fields.filament import Filaments
 from magfem.geometry import Circuit, CircuitPart, CoaxialWinding, Coil, FoilTrack, Stations
-from magfem.mesh.lattice import lattice
+from magfem.geometry.foil_ribbon import check_ribbon
+from magfem.mesh.lattice import lattice, shape_of
 from magfem.typing import Jet, Points
 from magfem.units import describe
 
@@ -29,6 +30,9 @@ RESOLUTIONS = (0.5, 4.0)
 _STATED = 0.5
 """Stated error over the difference between solutions on elements of full and of twice the size. Errors fall at least
 fourfold from one to the next, so that a third would do; what is more covers points that were not sampled."""
+MOST_UNKNOWNS = 1e6
+"""What one track may ask for: about 2 GB of memory and a minute."""
+
 _ROUNDING = 1e-9  # closed forms of windings are not stated to be better than this
 _ACROSS, _ACROSS_CORNERS = 4, 8  # elements across a track at resolution 1, and across one that turns corners
 _FILAMENT_ERROR = 1e-5  # of the field at the clearance: tracks so narrow that this holds are filaments
@@ -80,11 +84,21 @@ def solve_coil(
         stats={
             "unknowns": sum(circuit.unknowns for circuit in circuits),
             "cells": sum(circuit.currents.cells for circuit in circuits),
+            "quality": _quality(circuits),
             "seconds": time.perf_counter() - started,
             "peak_bytes": peak_bytes(),
         },
         settings={"resolution": float(refined.resolution), "conduction": conduction},
     )
+
+
+def _quality(circuits: list[SolvedCircuit]) -> dict[str, float]:
+    """Shape of the worst patch of all circuits; nothing for coils of closed forms only."""
+    sheets = [circuit.currents.within.nodes for circuit in circuits if circuit.currents.within.count]
+    if not sheets:
+        return {}
+    sine, aspect = shape_of(np.concatenate(sheets))
+    return {"least_sine": sine, "largest_aspect": aspect}
 
 
 def _jet(circuits: list[SolvedCircuit], points: Points) -> Jet:
@@ -147,7 +161,9 @@ def _solve_track(
 ) -> _Found:
     errors = {"filament": _filament_error(track, clearance), "sheet": _sheet_error(track, clearance), "solid": 0.0}
     model = wanted or choose_conduction(track, clearance)
-    across = _ACROSS_CORNERS if _has_corners(track.stations(resolution)) else _ACROSS
+    stations = check_ribbon(track, resolution)
+    across = _ACROSS_CORNERS if _has_corners(stations) else _ACROSS
+    _check_size(len(stations.left) * 2 * across * resolution, resolution)
     sheet = solve_sheet(track, resistivity, resolution, across)
     bounds = sheet.bounds
     if model == "filament":
@@ -171,6 +187,15 @@ def _solve_track(
         section=track.width * track.thickness,
         unknowns=sheet.unknowns,
     )
+
+
+def _check_size(unknowns: float, resolution: float) -> None:
+    """Raise InputError for a track that would not fit into memory."""
+    if unknowns > MOST_UNKNOWNS:
+        raise InputError(
+            f"about {unknowns:.1e} unknowns would be needed for one track at resolution {resolution:g}, and at most "
+            f"{MOST_UNKNOWNS:.0e} fit: lower the resolution to {resolution * (MOST_UNKNOWNS / unknowns) ** 0.5:.2g}"
+        )
 
 
 def _has_corners(stations: Stations) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
+from dataclasses import asdict
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from magfem.fem.solution import Solution
 from magfem.geometry import Magnets
 from magfem.mesh.generate import generate
 from magfem.mesh.mesh import check_volumes
+from magfem.mesh.quality import quality
 
 log = logging.getLogger("magfem")
 
@@ -63,6 +65,7 @@ def solve_magnets(geometry: Magnets, dimension: int, resolution: float, toleranc
             "cells": int(fine.mesh.cells.shape[0]),
             "iterations": fine.iterations,
             "residual": fine.residual,
+            "quality": asdict(quality(fine.mesh)),
             "seconds": time.perf_counter() - started,
             "peak_bytes": peak_bytes(),
         },

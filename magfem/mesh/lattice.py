@@ -34,3 +34,18 @@ def patches(lattice: Floats) -> Floats:
     i = 2 * np.arange(n)[:, None, None] + np.arange(3)[None, :, None]
     columns = [lattice[i, 2 * j + np.arange(3)[None, None, :]].reshape(n, 9, *lattice.shape[2:]) for j in range(m)]
     return np.ascontiguousarray(np.stack(columns, axis=1).reshape(n * m, 9, *lattice.shape[2:]))
+
+
+def shape_of(patches: Floats) -> tuple[float, float]:
+    """How well patches (p, 9, 3) are shaped: the least sine of their corners' angles, and the largest aspect ratio.
+
+    Long patches are meant to be long; what harms is a sine near 0.
+    """
+    corners = patches[:, [0, 6, 8, 2]]
+    sides = np.roll(corners, -1, axis=1) - corners
+    length = np.linalg.norm(sides, axis=-1)
+    before = np.roll(sides, 1, axis=1)
+    area = np.linalg.norm(np.cross(before, sides), axis=-1)
+    sine = area / (length * np.roll(length, 1, axis=1))
+    along, across = length[:, 0] + length[:, 2], length[:, 1] + length[:, 3]
+    return float(sine.min()), float(np.maximum(along / across, across / along).max())
