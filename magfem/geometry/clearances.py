@@ -15,7 +15,7 @@ def smallest_gap(stations: Stations, pitch: float) -> float:
 
     Leads are left out; a track is not held against itself along six pitches.
     """
-    from shapely import STRtree, distance, polygons
+    from shapely import STRtree, bounds, box, distance, polygons
 
     turns = np.flatnonzero(~stations.lead)
     rows = 2 * turns[:, None] + np.arange(3)
@@ -24,8 +24,9 @@ def smallest_gap(stations: Stations, pitch: float) -> float:
     middle = 0.5 * (stations.left + stations.right)
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(middle, axis=0), axis=1))])
     begin, end = along[rows[:, 0]], along[rows[:, 2]]
-    one, other = STRtree(parts).query(parts, predicate="dwithin", distance=pitch)
-    apart = np.maximum(begin[other] - end[one], begin[one] - end[other]) > _ALONG * pitch
+    west, south, east, north = bounds(parts).T
+    one, other = STRtree(parts).query(box(west - pitch, south - pitch, east + pitch, north + pitch))
+    apart = begin[other] - end[one] > _ALONG * pitch
     one, other = one[apart], other[apart]
     return float(distance(parts[one], parts[other]).min(initial=pitch))
 

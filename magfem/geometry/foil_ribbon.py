@@ -26,18 +26,20 @@ angle)⁴/32 of the radius, 6e-7."""
 LONGEST = 12.0  # widths, an element at resolution 1
 FINEST = 0.05  # widths, the element next to a corner at resolution 1; the next ones double
 _UPRIGHT = 1.25  # widths from a corner, over which stations turn from the mitre to square
+_BESIDE = 0.1  # radii of a bend, the element of a straight piece next to it; the next ones double
 _NEARBY = 17  # samples of a curve
 _SHARP = np.cos(np.radians(2.0))  # bends by less crowd no current
 AGREEMENT = 1e-4  # of the meshed area and length with their closed forms
 
 
 class Frame(NamedTuple):
-    """An end of a piece: place (3,) m, unit vectors (3,) along the current and to its left, width (m)."""
+    """An end of a piece: place (3,) m, unit vectors (3,) along the current and to its left, width and radius (m)."""
 
     place: Floats
     along: Floats
     across: Floats
     width: float
+    radius: float = inf  # of the centreline's bend
 
     @property
     def normal(self) -> Floats:
@@ -46,11 +48,15 @@ class Frame(NamedTuple):
 
 
 class Joint(NamedTuple):
-    """What two pieces share: from the centreline to the left edge (3,) m, the leaning normal (3,), corner or not."""
+    """What two pieces share.
+
+    offset: from the centreline to the left edge, (3,) m.  normal: (3,), leaning at a fold.  finest: m, the element next
+    to it; infinite where the current does not change.
+    """
 
     offset: Floats
     normal: Floats
-    sharp: bool
+    finest: float
 
 
 class Piece(Protocol):
@@ -103,8 +109,7 @@ class Straight:
         length, width = self.length, min(self.widths)
         along = (self.end - self.start) / length
         longest = min(LONGEST * width, bend * TURNING / max(abs(along[0]), 1e-9))
-        finest = [FINEST * width if joint.sharp else inf for joint in joints]
-        marks = _refined(_graded(length, finest[0], finest[1], longest), resolution)
+        marks = _refined(_graded(length, joints[0].finest, joints[1].finest, longest), resolution)
         slants = [float(joint.offset @ along) for joint in joints]
         slant = _slants(marks, length, max(self.widths), slants[0], slants[1])
         s, slant = _with_middles(marks)[:, None], _with_middles(slant)[:, None]
@@ -137,7 +142,13 @@ class Curved:
     @property
     def ends(self) -> tuple[Frame, Frame]:
         places, along, across = self._frames(np.array(self.span))
-        first, last = (Frame(places[i], along[i], across[i], self.width) for i in (0, 1))
+        step = (self.span[1] - self.span[0]) / self.samples
+        radii = []
+        for t in self.span[0], self.span[1] - step:
+            nearby, (before, after) = self.path(np.array([t, t + step]))
+            turn = abs(np.arctan2(before[0] * after[1] - before[1] * after[0], before @ after))
+            radii.append(float(np.linalg.norm(nearby[1] - nearby[0]) / max(turn, 1e-9)))
+        first, last = (Frame(places[i], along[i], across[i], self.width, radii[i]) for i in (0, 1))
         return first, last
 
     def rows(self, resolution: float, joints: tuple[Joint, Joint], bend: float) -> tuple[Floats, Floats, Floats]:
@@ -261,7 +272,10 @@ def _joint(before: Frame, after: Frame) -> Joint:
     turn = float(before.across @ after.across)
     offset = 0.5 * before.width * (before.across + after.across) / (1.0 + turn)
     normal = (before.normal + after.normal) / (1.0 + float(before.normal @ after.normal))
-    return Joint(offset, normal, turn < _SHARP)
+    if turn < _SHARP:
+        return Joint(offset, normal, FINEST * before.width)
+    tightest = min(before.radius, after.radius)
+    return Joint(offset, normal, max(FINEST * before.width, _BESIDE * tightest))
 
 
 def _graded(length: float, first: float, last: float, longest: float) -> Floats:
