@@ -13,6 +13,7 @@ from scipy.optimize import brentq
 
 from magfem.errors import InputError
 from magfem.fem.edge_elements import EdgeSolution, ribbon_loads, solve, winding_loads
+from magfem.geometry import CircuitPart, CoaxialWinding, Coil, FoilTrack
 from magfem.mesh.coil_in_air import (
     Ribbon,
     Winding,
@@ -98,6 +99,34 @@ def inductance_by_edge_elements(
         error = np.maximum(np.abs(inductance - extrapolate(values, sizes)[0]), step)
     order = np.vectorize(observed_order, signature="(n),(n)->()")(np.moveaxis(values, 0, -1), sizes)
     return EdgeInductance(inductance, error, order, values, sizes, edges, iterations, time.perf_counter() - start)
+
+
+def inductance_of_coil(coil: Coil, circuits: Sequence[str] | None = None, resolution: float = 1.0) -> EdgeInductance:
+    """Inductance matrix of a coil's circuits (None: all), by edge elements: the route that `solve` does not take.
+
+    Foil counts as a sheet without thickness. Raises InputError for coils that are neither all of foil nor all of
+    coaxial windings, and as `inductance_by_edge_elements`.
+    """
+    chosen = [circuit for circuit in coil.circuits if circuits is None or circuit.name in circuits]
+    parts = [part for circuit in chosen for part in circuit.parts]
+    if all(isinstance(part, CoaxialWinding) for part in parts):
+        return inductance_by_edge_elements(
+            [[_winding(part) for part in circuit.parts] for circuit in chosen], resolution
+        )
+    if not all(isinstance(part, FoilTrack) for part in parts):
+        raise InputError(f"{coil.name}: edge elements serve coils of foil and coils of coaxial windings only")
+    return inductance_by_edge_elements([[_ribbon(part) for part in circuit.parts] for circuit in chosen], resolution)
+
+
+def _winding(part: CircuitPart) -> Winding:
+    assert isinstance(part, CoaxialWinding)
+    return Winding(part.inner_radius, part.outer_radius, part.length, part.turns, part.centre)
+
+
+def _ribbon(part: CircuitPart) -> Ribbon:
+    assert isinstance(part, FoilTrack)
+    stations = part.stations(1.0)
+    return stations.left, stations.right
 
 
 Level = tuple[Floats, float, int, int]  # inductance, size, edges, iterations

@@ -6,7 +6,8 @@ import logging
 from typing import Any
 
 from magfem.errors import InputError
-from magfem.geometry import Magnets
+from magfem.geometry import Magnets, MeshedMagnets
+from magfem.mesh.external import mesh_in_air
 from magfem.mesh.mesh import Mesh
 from magfem.mesh.reading import read_mesh
 from magfem.mesh.session import gmsh_session
@@ -25,6 +26,8 @@ def generate(geometry: Magnets, dimension: int, resolution: float = 1.0) -> Mesh
     Bodies may touch. Raises MeshError when Gmsh fails or loses a body, InputError for bodies that overlap and for a
     mesh that would not fit into memory.
     """
+    if isinstance(geometry, MeshedMagnets):
+        return mesh_in_air(geometry.surfaces, geometry.feature_size, geometry.hull.radius, resolution)
     wanted = element_sizes(geometry, dimension, resolution)
     with gmsh_session() as gmsh:
         occ = gmsh.model.occ
