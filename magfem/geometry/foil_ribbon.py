@@ -13,8 +13,6 @@ from math import ceil, inf, pi
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
-from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from magfem.errors import InputError, MeshError
 from magfem.geometry.circuit import FoilTrack, Stations
@@ -165,6 +163,9 @@ class Curved:
 
     def _parameters(self, resolution: float, bend: float) -> Floats:
         """The parameters (2n+1,) of the stations."""
+        from scipy.interpolate import PchipInterpolator
+        from scipy.ndimage import maximum_filter1d, uniform_filter1d
+
         t = np.linspace(*self.span, self.samples + 1)
         slopes = self.path(t)[1]
         speed = np.linalg.norm(slopes, axis=1)

@@ -369,7 +369,7 @@ MM = 1e-3
     width=st.floats(0.05 * MM, 0.5 * MM),
     gap=st.floats(0.05 * MM, 0.5 * MM),
 )
-@settings(max_examples=60, derandomize=True, deadline=None)
+@settings(max_examples=40, derandomize=True, deadline=None)
 def test_random_outlines_are_coils_with_their_gap_or_one_sentence(
     outline: Flower | Rectangle | Polygon, turns: int, width: float, gap: float
 ) -> None:
