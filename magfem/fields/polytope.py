@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from magfem.compiled import kernel
-from magfem.typing import Floats, Integers, Points
+from magfem.typing import Floats, Integers
 
 
 @kernel
