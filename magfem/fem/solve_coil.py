@@ -161,7 +161,8 @@ def _solve_track(
 ) -> _Found:
     errors = {"filament": _filament_error(track, clearance), "sheet": _sheet_error(track, clearance), "solid": 0.0}
     model = wanted or choose_conduction(track, clearance)
-    stations = check_ribbon(track, resolution)
+    # What the error statement alone is made from may be coarser than any mesh that users get.
+    stations = check_ribbon(track, resolution) if resolution >= RESOLUTIONS[0] else track.stations(resolution)
     across = _ACROSS_CORNERS if _has_corners(stations) else _ACROSS
     _check_size(len(stations.left) * 2 * across * resolution, resolution)
     sheet = solve_sheet(track, resistivity, resolution, across)
