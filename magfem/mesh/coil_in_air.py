@@ -294,6 +294,10 @@ def _fill(gmsh: Any, outer: float) -> tuple[Floats, Integers]:
             raise MeshError(f"Gmsh left a part of the air without elements (entity {entity})")
         found.append(np.asarray(nodes[0], dtype=np.int64).reshape(-1, 4))
     cells = np.concatenate(found)
+    if cells.max() > tags.max():  # what HXT leaves behind when its surfaces intersect
+        raise MeshError(
+            "the air could not be meshed: strips must not touch or cross, at this resolution's chords either"
+        )
     used, numbered = np.unique(cells, return_inverse=True)
     row = np.full(int(tags.max()) + 1, -1, dtype=np.int64)
     row[np.asarray(tags, dtype=np.int64)] = np.arange(tags.size)
