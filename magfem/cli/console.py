@@ -42,8 +42,10 @@ def listing(rows: Sequence[tuple[str, str]]) -> str:
 
 
 def moment_text(moment: Floats) -> str:
-    """A magnetic moment (3,) A·m² in words."""
-    return f"({', '.join(format_quantity(component, 'moment') for component in moment)})"
+    """A magnetic moment (3,) A·m² in words; what rounding leaves of a component is none."""
+    least = 1e-9 * max(map(abs, moment))
+    shown = [float(component) if abs(component) > least else 0.0 for component in moment]
+    return f"({', '.join(format_quantity(component, 'moment') for component in shown)})"
 
 
 @contextmanager

@@ -12,7 +12,10 @@ from magfem.cli.parser import CommandLine
 from magfem.units import format_quantity
 
 if TYPE_CHECKING:
-    from magfem.geometry import Geometry
+    from magfem.geometry import Coil, Geometry, Magnets
+
+MANY = 4
+"""Circuits that are listed one by one."""
 
 
 def add(commands: CommandLine) -> None:
@@ -21,11 +24,11 @@ def add(commands: CommandLine) -> None:
         "show",
         run,
         "a picture and the derived numbers of a device, no solve",
-        "Reads a device card, prints the numbers that follow from it (volume, moment, region of the model, ...)\n"
-        "and draws the device.",
+        "Reads a device card, prints the numbers that follow from it (volume, moment, length of a coil's wire,\n"
+        "region of the model, ...) and draws the device: magnets with their poles, coils with their current.",
         [
             "magfem show ring_magnet_4x1.5x1",
-            "magfem show ring_magnet_4x1.5x1 -o ring.png",
+            "magfem show planar_coil_12mm -o coil.png",
             "magfem show ./mine.toml --json",
         ],
     )
@@ -51,40 +54,106 @@ def _data(geometry: Geometry, picture: Path) -> dict[str, Any]:
     """The device's numbers, SI units."""
     from magfem.fields.hull import hull_to_dict
     from magfem.fields.region import region_to_dict
-    from magfem.geometry import describe
+    from magfem.geometry import Coil, describe
 
     return {
         **describe(geometry),
         "volume": geometry.volume,
-        "area": geometry.area,
-        "moment": geometry.moment,
-        "feature_size": geometry.feature_size,
+        **(_coil_data(geometry) if isinstance(geometry, Coil) else _magnet_data(_magnets(geometry))),
         "hull": hull_to_dict(geometry.hull),
         "region": region_to_dict(geometry.region),
-        "dimension": _dimension(geometry),
         "picture": str(picture),
     }
 
 
-def _text(geometry: Geometry, picture: Path) -> str:
-    from magfem.fields.hull import hull_to_dict
+def _magnet_data(geometry: Magnets) -> dict[str, Any]:
+    return {
+        "area": geometry.area,
+        "moment": geometry.moment,
+        "feature_size": geometry.feature_size,
+        "bodies": [
+            {"name": body.name, "volume": body.volume, "magnetisation": body.material.remanence_vector}
+            for body in geometry.bodies
+        ],
+        "dimension": _dimension(geometry),
+    }
 
-    hull = hull_to_dict(geometry.hull)
-    shape = hull.pop("kind")
-    sizes = ", ".join(f"{key} {format_quantity(value, 'length')}" for key, value in hull.items())
+
+def _coil_data(geometry: Coil) -> dict[str, Any]:
+    from magfem.report.coil_numbers import conductor_numbers
+
+    conductor = geometry.conductor
+    return {
+        "conductor": {
+            "material": conductor.material,
+            "temperature": conductor.temperature,
+            "resistivity": conductor.resistivity,
+            "current_density_limit": conductor.current_density_limit,
+        },
+        "circuits": {
+            one.name: {
+                "turns": one.turns,
+                "length": one.length,
+                "lead_length": one.lead_length,
+                "volume": one.volume,
+                "resistance_estimate": one.estimate,
+            }
+            for one in conductor_numbers(geometry)
+        },
+    }
+
+
+def _text(geometry: Geometry, picture: Path) -> str:
+    from magfem.geometry import Coil
+
     rows = [
         ("kind", geometry.kind),
         ("source", geometry.source or "not stated"),
-        ("volume", f"{geometry.volume * 1e9:.6g} mm³"),
-        ("area", f"{geometry.area * 1e6:.6g} mm²"),
-        ("moment", f"{moment_text(geometry.moment)} if rigidly magnetised"),
-        ("hull", f"{shape}, {sizes}"),
+        *(_coil_rows(geometry) if isinstance(geometry, Coil) else _magnet_rows(_magnets(geometry))),
+        ("hull", geometry.hull.describe()),
         ("region", geometry.region.describe()),
-        ("feature size", format_quantity(geometry.feature_size, "length")),
-        ("solved in", f"dimension {_dimension(geometry)}"),
         ("picture", str(picture)),
     ]
     return f"{geometry.name}\n{listing(rows)}"
+
+
+def _magnet_rows(geometry: Magnets) -> list[tuple[str, str]]:
+    bodies = len(geometry.bodies)
+    return [
+        *([("bodies", str(bodies))] if bodies > 1 else []),
+        ("volume", f"{geometry.volume * 1e9:.6g} mm³"),
+        ("area", f"{geometry.area * 1e6:.6g} mm²"),
+        ("moment", f"{moment_text(geometry.moment)} if rigidly magnetised"),
+        ("feature size", format_quantity(geometry.feature_size, "length")),
+        ("solved in", f"dimension {_dimension(geometry)}"),
+    ]
+
+
+def _coil_rows(geometry: Coil) -> list[tuple[str, str]]:
+    """What the card tells of the conductor; of many circuits, which are alike, that of the first."""
+    from magfem.report.coil_numbers import conductor_numbers
+
+    circuits = conductor_numbers(geometry)
+    shown = circuits if len(circuits) <= MANY else circuits[:1]
+    names = ", ".join(one.name for one in circuits[:MANY]) + (", ..." if len(circuits) > MANY else "")
+    rows = [
+        ("circuits", f"{len(circuits)}: {names}"),
+        ("volume", f"{geometry.volume * 1e9:.6g} mm³ of {geometry.conductor.material}, leads apart"),
+        ("resistivity", format_quantity(geometry.conductor.resistivity, "resistivity")),
+    ]
+    for one in shown:
+        turns = "" if one.turns is None else f"{one.turns:g} turns, "
+        leads = f", leads {format_quantity(one.lead_length, 'length')}" if one.lead_length else ""
+        about = f"about {format_quantity(one.estimate, 'resistance')}"
+        rows.append((one.name, f"{turns}{format_quantity(one.length, 'length')}{leads}, {about}"))
+    return [*rows, ("", "(resistivity · length / section; `magfem solve` finds the true resistance)")]
+
+
+def _magnets(geometry: Geometry) -> Magnets:
+    from magfem.geometry import Magnets
+
+    assert isinstance(geometry, Magnets)
+    return geometry
 
 
 def _dimension(geometry: Geometry) -> int:

@@ -68,7 +68,8 @@ def _reference(model: FieldModel, shown: str, against: str) -> tuple[Field, str]
     check_resolution(own, geometry, dimension)
     resolution = min(2 * own, resolutions(geometry, dimension)[1])
     finer = "twice the" if resolution == 2 * own else f"{resolution / own:g} times the"
-    name = f"finite elements at {finer} resolution ({'' if dimension is None else f'dimension {dimension}, '}resolution {resolution:g})"
+    where = "" if dimension is None else f"dimension {dimension}, "
+    name = f"finite elements at {finer} resolution ({where}resolution {resolution:g})"
     return solve(geometry, dimension, resolution), name
 
 

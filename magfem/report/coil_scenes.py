@@ -15,11 +15,13 @@ from magfem.mesh.coil_surfaces import coil_surfaces
 from magfem.report.coil_outline import Path, Strip, is_flat, paths, strips, swept_lattices
 from magfem.report.figures.style import COPPER, EDGE, INK, LEAD, WIDTH, Picture, drawing, figure, png
 from magfem.report.scenes import View, axes_cross, canvas, render, scale_bar, view
-from magfem.typing import Floats, Points
+from magfem.typing import Floats, Integers, Points
 
 MILLI = 1e3
-_FEW = 4  # circuits whose names are told, and that get pictures of their own when they hide each other
-_MARGIN = 1.12  # of a 3D picture over the coil
+FEW = 4
+"""Circuits that get pictures of their own; of more, all are drawn together."""
+
+_MARGIN = 1.2  # of a 3D picture over the coil
 _ACROSS = 0.09  # height of the side view over its width, heights stretched
 _ARROWS_FLAT, _ARROWS = 3, 4  # to a circuit in the plan, to a part in 3D
 
@@ -54,7 +56,7 @@ def _plan(geometry: Coil) -> Picture:
         wide = WIDTH - 0.75
         tall = wide * size[1] / size[0]
         scale = min(1.0, 1.3 * wide / tall)
-        drawn = figure(scale * (tall + wide * _ACROSS) + 1.35)
+        drawn = figure(scale * (tall + wide * _ACROSS) + 1.35, scale * wide + 0.75)
         above, beside = drawn.subplots(2, 1, sharex=True, height_ratios=(size[1], size[0] * _ACROSS))
         for _, tracks in by_circuit:
             ordered = sorted(tracks, key=lambda track: _height(track[1]))
@@ -130,15 +132,20 @@ def _side(axes: Axes, by_circuit: list[tuple[str, list[tuple[FoilTrack, tuple[St
         for track, cut in tracks:
             half = track.thickness / 2
             for strip in cut:
-                x = strip.outline[:, 0] * MILLI
+                x = np.stack([strip.left[:, 0], strip.right[:, 0]])
                 z = strip.middle[:, 2]
-                bottom, top = (float(z.min()) - half) * 1e6, (float(z.max()) + half) * 1e6
-                low, high = min(low, bottom), max(high, top)
-                corners = [(x.min(), bottom), (x.max(), bottom), (x.max(), top), (x.min(), top)]
-                axes.add_patch(Polygon(corners, fc=LEAD if strip.lead else COPPER, ec=EDGE, lw=0.3))
+                low, high = min(low, float(z.min()) - half), max(high, float(z.max()) + half)
+                # Turns are one bar from end to end; of a lead every leg is its own.
+                runs = [slice(k, k + 2) for k in range(len(z) - 1)] if strip.lead else [slice(None)]
+                colour = LEAD if strip.lead else COPPER
+                for run in runs:
+                    left, right = x[:, run].min() * MILLI, x[:, run].max() * MILLI
+                    bottom, top = (z[run].min() - half) * 1e6, (z[run].max() + half) * 1e6
+                    corners = [(left, bottom), (right, bottom), (right, top), (left, top)]
+                    axes.add_patch(Polygon(corners, fc=colour, ec=colour, lw=0.8))
     room = 0.15 * (high - low)
-    axes.set_ylim(low - room, high + room)
-    return float(_ACROSS * size[0] / ((high - low + 2 * room) * 1e-6))
+    axes.set_ylim((low - room) * 1e6, (high + room) * 1e6)
+    return float(_ACROSS * size[0] / (high - low + 2 * room))
 
 
 # All others
@@ -146,13 +153,15 @@ def _side(axes: Axes, by_circuit: list[tuple[str, list[tuple[FoilTrack, tuple[St
 
 def _space(geometry: Coil) -> Picture:
     """In 3D; circuits rolled one inside the other get pictures of their own."""
-    apart = 1 < len(geometry.circuits) <= _FEW
+    apart = 1 < len(geometry.circuits) <= FEW
     groups = [(circuit,) for circuit in geometry.circuits] if apart else [geometry.circuits]
-    surfaces = dict(zip([c.name for c in geometry.circuits], _surfaces(geometry), strict=True))
+    surfaces = dict(zip([c.name for c in geometry.circuits], pieces(geometry), strict=True))
     reach = max(float(np.linalg.norm(points, axis=1).max()) for quads in surfaces.values() for points, _, _ in quads)
     seen = view(_MARGIN * reach)
+    flat = [seen.project(points) for quads in surfaces.values() for points, _, _ in quads]
+    aside = min(1.25 * max(float(np.abs(points[:, 0]).max()) for points in flat) + 0.25 * seen.half, seen.half)
     with drawing():
-        drawn = figure(4.6 if not apart else 0.25 + WIDTH / len(groups) * 1.25)
+        drawn = figure(min(4.6, 0.85 + (WIDTH / len(groups)) * seen.half / aside))
         for number, circuits in enumerate(groups):
 
             def fill(plotter: Any, pv: Any, circuits: tuple[Circuit, ...] = circuits) -> None:
@@ -160,6 +169,7 @@ def _space(geometry: Coil) -> Picture:
                     _add_circuit(plotter, pv, circuit, surfaces[circuit.name], seen, reach)
 
             axes = canvas(drawn.add_subplot(1, len(groups), number + 1), render(fill, seen), seen)
+            axes.set_xlim(-aside * MILLI, aside * MILLI)
             scale_bar(axes, seen)
             if number == 0:
                 axes_cross(axes, seen)
@@ -177,24 +187,24 @@ def _space(geometry: Coil) -> Picture:
     )
 
 
-def _surfaces(geometry: Coil) -> list[list[tuple[Points, Floats, bool]]]:
+def pieces(geometry: Coil) -> list[list[tuple[Points, Integers, bool]]]:
     """For every circuit pieces of surface: points (n, 3) m, quadrilaterals (q, 4), whether it is a lead."""
     found = []
     for circuit, surface in zip(geometry.circuits, coil_surfaces(geometry), strict=True):
-        pieces: list[tuple[Points, Floats, bool]] = []
+        own: list[tuple[Points, Integers, bool]] = []
         swept = [part for part in circuit.parts if isinstance(part, SweptWinding)]
         for part in swept:
-            pieces += [(*_grid(face), False) for face in swept_lattices(part, 1.0)]
+            own += [(*_grid(face), False) for face in swept_lattices(part, 1.0)]
         if not swept:
             for lead in (False, True):
                 nodes = surface.nodes[surface.lead.astype(bool) == lead]
                 if len(nodes):
-                    pieces.append((*_patches(nodes), lead))
-        found.append(pieces)
+                    own.append((*_patches(nodes), lead))
+        found.append(own)
     return found
 
 
-def _grid(lattice: Points) -> tuple[Points, Floats]:
+def _grid(lattice: Points) -> tuple[Points, Integers]:
     """A lattice (n, m, 3) as quadrilaterals."""
     n, m = lattice.shape[:2]
     number = np.arange(n * m).reshape(n, m)
@@ -202,7 +212,7 @@ def _grid(lattice: Points) -> tuple[Points, Floats]:
     return lattice.reshape(-1, 3), cells.reshape(-1, 4)
 
 
-def _patches(nodes: Floats) -> tuple[Points, Floats]:
+def _patches(nodes: Floats) -> tuple[Points, Integers]:
     """Biquadratic patches (p, 9, 3) as quadrilaterals, six along and two across each."""
     u = np.linspace(0.0, 1.0, 7)
     shapes = np.stack([(1 - u) * (1 - 2 * u), 4 * u * (1 - u), u * (2 * u - 1)], axis=1)
@@ -216,21 +226,22 @@ def _add_circuit(
     plotter: Any,
     pv: Any,
     circuit: Circuit,
-    surfaces: list[tuple[Points, Floats, bool]],
+    surfaces: list[tuple[Points, Integers, bool]],
     seen: View,
     reach: float,
 ) -> None:
     for points, cells, lead in surfaces:
-        faces = np.column_stack([np.full(len(cells), 4), cells]).ravel()
-        shell = pv.PolyData(points, faces).clean(tolerance=1e-7)
+        _, first, number = np.unique(np.rint(points / (1e-6 * reach)), axis=0, return_index=True, return_inverse=True)
+        faces = np.column_stack([np.full(len(cells), 4), number.reshape(-1)[cells]]).ravel()
+        shell = pv.PolyData(points[first], faces)
         plotter.add_mesh(
             shell,
             color=LEAD if lead else COPPER,
             smooth_shading=True,
             split_sharp_edges=True,
             feature_angle=35,
-            ambient=0.45,
-            diffuse=0.65,
+            ambient=0.62,
+            diffuse=0.62,
             specular=0.25,
             specular_power=18,
         )
@@ -252,15 +263,13 @@ def _visible_pieces(path: Path, seen: View, reach: float, wound: bool) -> list[P
     line = path.points + off * path.outward
     chosen: list[float] = []
     count = _ARROWS if wound else 3 * _ARROWS
-    for share in np.linspace(0.0, 1.0, 8 * count, endpoint=False) + 1 / (16 * count):
-        place = share * along[-1]
+    for place in np.linspace(0.0, along[-1], 16 * count, endpoint=False) + along[-1] / (32 * count):
         near = np.abs(along - place) <= wanted / 2
-        if near.any() and facing[near].min() > (0.35 if wound else 0.5):
-            chosen.append(float(share))
-    if not chosen:
-        return []
-    kept = [chosen[round(i)] for i in np.linspace(0, len(chosen) - 1, 2 * min(count, len(chosen)) + 1)[1::2]]
-    return [_piece(line, share, wanted) for share in kept]
+        apart = not chosen or place - chosen[-1] > 1.5 * wanted
+        if apart and near.any() and facing[near].min() > (0.35 if wound else 0.5):
+            chosen.append(float(place))
+    kept = chosen[:: max(1, -(-len(chosen) // count))]
+    return [_piece(line, place / along[-1], wanted) for place in kept]
 
 
 def _add_arrow(plotter: Any, pv: Any, piece: Points, radius: float) -> None:

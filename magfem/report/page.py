@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import base64
 import json
 import logging
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
-from markupsafe import Markup
 
 from magfem.fields import Shell
 from magfem.fitting import FieldModel
-from magfem.geometry import describe
+from magfem.geometry import Magnets, PermanentMagnet, describe
 from magfem.report import measured, numbers
-from magfem.report.figures.style import DPI, Picture
+from magfem.report.environment import environment
 from magfem.report.pictures import draw
 from magfem.report.subject import Subject
 from magfem.units import format_quantity
@@ -24,36 +20,13 @@ from magfem.units import format_quantity
 log = logging.getLogger("magfem")
 
 TEMPLATE = "page.html.j2"
-CSS_PIXELS = 96 / DPI  # of the page, for one of a picture
 
 
 def render(subject: Subject) -> str:
     """The whole page as HTML; nothing in it is loaded from outside."""
     pictures = draw(subject)
     log.info("report: page")
-    environment = Environment(
-        loader=FileSystemLoader(Path(__file__).parent),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters.update(
-        percent=_percent,
-        bound=_bound,
-        number=numbers.number,
-        quantity=numbers.quantity,
-        size=numbers.size,
-        breakable=_breakable,
-        measured=numbers.measured,
-        millimetres=numbers.millimetres,
-        thousands=numbers.thousands,
-        direction=numbers.direction,
-        inline=_inline,
-        width=lambda picture: round(picture.size[0] * CSS_PIXELS),
-        height=lambda picture: round(picture.size[1] * CSS_PIXELS),
-    )
-    return environment.get_template(TEMPLATE).render(context(subject), pictures=pictures)
+    return environment().get_template(TEMPLATE).render(context(subject), pictures=pictures)
 
 
 def context(subject: Subject) -> dict[str, Any]:
@@ -76,24 +49,6 @@ def context(subject: Subject) -> dict[str, Any]:
     }
 
 
-def _percent(relative: float) -> Markup:
-    """A relative error to two digits; the machine-readable value keeps all of them."""
-    return Markup('<data value="{}">{}</data>').format(repr(float(relative)), numbers.percent(relative))
-
-
-def _bound(relative: float) -> Markup:
-    return Markup('<data value="{}">{}</data>').format(repr(float(relative)), numbers.bound(relative))
-
-
-def _breakable(path: str) -> Markup:
-    """A path that may be broken after its slashes."""
-    return Markup("/<wbr>").join(path.split("/"))
-
-
-def _inline(picture: Picture) -> str:
-    return f"data:image/png;base64,{base64.b64encode(picture.png).decode('ascii')}"
-
-
 def _device(subject: Subject) -> dict[str, Any] | None:
     """Facts of the device by their names."""
     geometry = subject.geometry
@@ -101,9 +56,8 @@ def _device(subject: Subject) -> dict[str, Any] | None:
         return None
     facts = [(key.replace("_", " "), numbers.size(getattr(geometry, key), 6)) for key in geometry.dimensions]
     facts.append(("volume", f"{numbers.number(geometry.volume * 1e9)} mm³"))
-    for body in geometry.bodies:
-        material = body.material
-        prefix = f"{body.name}: " if len(geometry.bodies) > 1 else ""
+    for material, names in _materials(geometry).items():
+        prefix = f"{names}: " if len(geometry.bodies) > 1 else ""
         facts += [
             (f"{prefix}remanence", format_quantity(material.remanence, "flux density")),
             (f"{prefix}recoil permeability", f"{material.recoil_permeability:g}"),
@@ -115,6 +69,14 @@ def _device(subject: Subject) -> dict[str, Any] | None:
         "source": geometry.source,
         "facts": facts,
     }
+
+
+def _materials(geometry: Magnets) -> dict[PermanentMagnet, str]:
+    """The names of the bodies of every material."""
+    found: dict[PermanentMagnet, list[str]] = {}
+    for body in geometry.bodies:
+        found.setdefault(body.material, []).append(body.name)
+    return {material: ", ".join(names) for material, names in found.items()}
 
 
 def _field_range(model: FieldModel) -> dict[str, float]:

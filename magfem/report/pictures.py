@@ -13,7 +13,7 @@ from magfem.fields import Everywhere, Field
 from magfem.fields.terms import Terms
 from magfem.fitting.families import dissertation_families
 from magfem.fitting.model import terms_from_list
-from magfem.geometry import Geometry
+from magfem.geometry import Magnets
 from magfem.report.figures import (
     Contender,
     Picture,
@@ -80,7 +80,7 @@ def _snapped(moment: Floats) -> Floats:
     return unit
 
 
-def _closed_form(geometry: Geometry) -> Field | None:
+def _closed_form(geometry: Magnets) -> Field | None:
     """The closed form of the same device at recoil permeability 1, where one is known."""
     material = getattr(geometry, "material", None)
     if material is None:

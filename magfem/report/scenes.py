@@ -92,16 +92,15 @@ def _has_moment(geometry: Magnets) -> bool:
 
 
 def _magnetisations(axes: Axes, geometry: Magnets, seen: View, surfaces: tuple[Surface, ...]) -> None:
-    """An arrow over the middle of every body, along its magnetisation; a ring with a dot or cross along the view."""
+    """An arrow over the middle of every body, along its magnetisation."""
     materials = {body.name: body.material for body in geometry.bodies}
     for surface in surfaces:
         low, high = surface.points.min(axis=0), surface.points.max(axis=0)
         direction = unit(np.array(materials[surface.name].magnetisation, dtype=float))
         spread = surface.points @ direction
         half = 0.32 * float(np.ptp(spread)) * direction
-        # Before the body, so that the arrow stands over the wall that is seen.
         middle = (low + high) / 2
-        start, end = (seen.project(middle + side * half) * MILLI for side in (-1, 1))
+        start, end = (tuple((seen.project(middle + side * half) * MILLI).tolist()) for side in (-1, 1))
         for colour, width in ((INK, 3.6), ("white", 1.8)):
             arrow = FancyArrowPatch(start, end, arrowstyle="-|>", mutation_scale=9, shrinkA=0, shrinkB=0)
             arrow.set(color=colour, linewidth=width)
@@ -336,8 +335,8 @@ def scale_bar(axes: Axes, seen: View) -> None:
     """A length to measure by, below the device."""
     limit = seen.half * MILLI
     size = max(s for p in range(-3, 4) for s in (10.0**p, 2 * 10.0**p, 5 * 10.0**p) if s <= 0.6 * limit)
-    axes.plot([-size / 2, size / 2], [-0.92 * limit] * 2, color=INK, linewidth=2.5, solid_capstyle="butt")
-    axes.text(0, -0.9 * limit, length(size / MILLI), ha="center", va="bottom")
+    axes.plot([-size / 2, size / 2], [-0.96 * limit] * 2, color=INK, linewidth=2.5, solid_capstyle="butt")
+    axes.text(size / 2 + 0.03 * limit, -0.96 * limit, length(size / MILLI), ha="left", va="center")
 
 
 def _moment_label(axes: Axes, geometry: Magnets, seen: View, reach: float) -> None:
@@ -349,7 +348,7 @@ def _moment_label(axes: Axes, geometry: Magnets, seen: View, reach: float) -> No
 def axes_cross(axes: Axes, seen: View) -> None:
     """The directions of x, y and z in the lower left corner."""
     limit = seen.half * MILLI
-    origin = np.array([-0.82, -0.8]) * limit
+    origin = np.array([axes.get_xlim()[0] + 0.18 * limit, -0.8 * limit])
     for name, unit in zip("xyz", np.eye(3), strict=True):
         tip = origin + 0.2 * limit * seen.project(unit)
         axes.add_patch(

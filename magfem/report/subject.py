@@ -7,9 +7,11 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
+from magfem.errors import InputError
 from magfem.fem import Solution, solve
+from magfem.fem.coil_solution import CoilSolution
 from magfem.fitting import FieldModel, fit, load_model
-from magfem.geometry import Geometry, geometry_from_text, load_geometry
+from magfem.geometry import Magnets, geometry_from_text, load_geometry
 from magfem.geometry.card import read_table
 from magfem.geometry.catalogue import is_path, names
 from magfem.report.recipe import Measurement, Recipe, load_recipe
@@ -29,12 +31,21 @@ class Subject:
     usage: str
     model: FieldModel
     is_model: bool = False
-    geometry: Geometry | None = None
+    geometry: Magnets | None = None
     solution: Solution | None = None
     measurements: tuple[Measurement, ...] = ()
 
 
-def gather(target: str | os.PathLike[str]) -> Subject:
+@dataclass(frozen=True, eq=False)
+class CoilSubject:
+    """Everything that the report of a coil draws from. usage: what a reader types: the name or path of its card."""
+
+    title: str
+    usage: str
+    solution: CoilSolution
+
+
+def gather(target: str | os.PathLike[str]) -> Subject | CoilSubject:
     """Solve and fit, or load, what `target` names.
 
     A name is a report recipe if there is one, else a model, else a card; a path is told apart by its ending and,
@@ -54,18 +65,24 @@ def gather(target: str | os.PathLike[str]) -> Subject:
     return _from_card(shown)
 
 
-def _from_recipe(recipe: Recipe, folder: Path | None) -> Subject:
+def _from_recipe(recipe: Recipe, folder: Path | None) -> Subject | CoilSubject:
     """A recipe's device is a catalogue name, or a path seen from the recipe's folder."""
     beside = folder is not None and is_path(recipe.device, ".toml")
     device = os.fspath(folder / recipe.device) if folder is not None and beside else recipe.device
     return _from_card(device, recipe)
 
 
-def _from_card(device: str, recipe: Recipe | None = None) -> Subject:
+def _from_card(device: str, recipe: Recipe | None = None) -> Subject | CoilSubject:
     geometry = load_geometry(device)
+    title = (recipe and recipe.title) or geometry.name
+    if not isinstance(geometry, Magnets) and recipe and recipe.measurements:
+        raise InputError(f"{geometry.name}: measurements are compared for magnets only: leave them out of the recipe")
     solution = solve(geometry)
+    if isinstance(solution, CoilSolution):
+        return CoilSubject(title, device, solution)
+    assert isinstance(geometry, Magnets)
     return Subject(
-        title=(recipe and recipe.title) or geometry.name,
+        title=title,
         usage=device,
         model=fit(solution),
         geometry=geometry,
@@ -79,8 +96,11 @@ def _from_model(target: str | os.PathLike[str]) -> Subject:
     model = load_model(target)  # type: ignore[arg-type]
     device, solver = model.provenance.get("device"), model.provenance.get("solver")
     geometry = geometry_from_text(device["card"]["text"], device["card"]["path"]) if device else None
+    assert geometry is None or isinstance(geometry, Magnets)  # no coil has a model
     solution = None
     if geometry is not None and solver:
         log.info("report: solving the model's device again")
-        solution = solve(geometry, solver["dimension"], solver["resolution"])
+        again = solve(geometry, solver["dimension"], solver["resolution"])
+        assert isinstance(again, Solution)
+        solution = again
     return Subject(model.name, os.fspath(target), model, True, geometry, solution)

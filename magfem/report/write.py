@@ -20,14 +20,16 @@ def write_report(target: str | os.PathLike[str], path: str | os.PathLike[str], p
     Raises InputError before anything is computed when the place cannot be written or no browser is there to
     print, CardError for a card or recipe that is wrong, MissingProgramError when nothing can be drawn.
     """
+    from magfem.report.coil_page import render as render_coil
     from magfem.report.page import render
     from magfem.report.pdf import find_browser, print_pdf
-    from magfem.report.subject import gather
+    from magfem.report.subject import CoilSubject, gather
 
     html = _writable(path, (".html", ".htm"))
     if pdf:
         find_browser()
-    write_text(html, render(gather(target)))
+    subject = gather(target)
+    write_text(html, render_coil(subject) if isinstance(subject, CoilSubject) else render(subject))
     log.info("report: %s", html)
     return (html, print_pdf(html)) if pdf else (html,)
 

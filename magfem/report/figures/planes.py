@@ -85,18 +85,28 @@ def field_planes(geometry: Geometry, surfaces: tuple[Surface, ...]) -> tuple[Pla
     return Plane("x", "z", half), Plane("x", "y", half)
 
 
-def field_map(field: Field, surfaces: tuple[Surface, ...], plane: Plane) -> Picture:
-    """|B| in colours, the direction of its part in the plane as field lines, the device's outline."""
-    side, points = plane.points(_MAP)
+def field_map(field: Field, surfaces: tuple[Surface, ...], plane: Plane, name: str = "", caption: str = "") -> Picture:
+    """|B| in colours, the direction of its part in the plane as field lines, the device's outline.
+
+    name, caption: of the picture, where those of a magnet do not fit.  counts: samples along a side, of |B| and of the
+    field lines.
+    """
+    side, points = plane.points(counts[0])
     size = np.linalg.norm(field.B(points, outside="extrapolate"), axis=-1) * MILLI
-    coarse, seeds = plane.points(_LINES)
+    coarse, seeds = plane.points(counts[1])
     direction = field.B(seeds, outside="extrapolate")[..., list(plane.columns)]
     direction /= np.maximum(np.linalg.norm(direction, axis=-1, keepdims=True), 1e-300)
     low, high = (float(q) for q in np.quantile(size, (0.002, 0.9995)))
     with drawing():
-        drawn, axes, bar_axes = _square()
+        drawn, axes, bar_axes = square()
         image = axes.pcolormesh(
-            side * MILLI, side * MILLI, size, norm=LogNorm(low, high), cmap=MAGNITUDE, rasterized=True
+            side * MILLI,
+            side * MILLI,
+            size,
+            norm=LogNorm(low, high),
+            cmap=MAGNITUDE,
+            rasterized=True,
+            shading="nearest" if counts[0] >= _MAP else "gouraud",
         )
         axes.streamplot(
             coarse * MILLI,
@@ -109,22 +119,23 @@ def field_map(field: Field, surfaces: tuple[Surface, ...], plane: Plane) -> Pict
             density=1.1,
         )
         outline(axes, surfaces, plane, "white")
-        _frame(axes, plane)
+        frame(axes, plane)
         bar = drawn.colorbar(image, cax=bar_axes)
-        axes.set_title("|B| (mT)", loc="left")
+        axes.set_title(f"|B| (m{field.unit})", loc="left")
         plain_log(bar.ax.yaxis, fine=high < 1e3 * low)
         bar.ax.minorticks_off()
         content = png(drawn)
     return Picture(
-        f"field_{plane.horizontal}{plane.vertical}",
+        name or f"field_{plane.horizontal}{plane.vertical}",
         content,
-        f"Map of the flux density in the {plane.words}, from {low:.3g} to {high:.3g} mT, with field lines.",
-        f"|B| and field lines in the {plane.words}; the white outline is the device"
+        f"Map of the flux density in the {plane.words}, from {low:.3g} to {high:.3g} m{field.unit}, with field lines.",
+        caption
+        or f"|B| and field lines in the {plane.words}; the white outline is the device"
         + (", seen through the plane in front of it." if plane.height else ", inside of which B is shown too."),
     )
 
 
-def _square() -> tuple[Figure, Axes, Axes]:
+def square() -> tuple[Figure, Axes, Axes]:
     """A figure with a square map and its colour bar, at the same place in all of them."""
     height, left, bottom, side = 3.9, 0.56, 0.46, 3.1  # inches
     drawn = Figure(figsize=(WIDTH, height), dpi=DPI)
@@ -153,7 +164,8 @@ def outline(axes: Axes, surfaces: tuple[Surface, ...], plane: Plane, colour: str
         axes.add_collection(LineCollection(list(segments), colors=colour, linewidths=1.3, linestyles=style))
 
 
-def _frame(axes: Axes, plane: Plane) -> None:
+def frame(axes: Axes, plane: Plane) -> None:
+    """Limits and labels of the plane's axes, in mm."""
     limit = plane.half * MILLI
     axes.set(
         xlim=(-limit, limit),
@@ -188,13 +200,13 @@ def error_map(
     largest = float(errors[region.contains(points)].max())
     top = 10.0 ** np.ceil(np.log10(largest))
     with drawing():
-        drawn, axes, bar_axes = _square()
+        drawn, axes, bar_axes = square()
         image = axes.pcolormesh(
             side * MILLI, side * MILLI, errors, norm=LogNorm(top * 1e-4, top), cmap=ERROR, rasterized=True
         )
         _hatch_outside(axes, region, plane)
         outline(axes, surfaces, plane, INK)
-        _frame(axes, plane)
+        frame(axes, plane)
         if worst is not None:
             horizontal, vertical = worst[list(plane.columns)] * MILLI
             axes.plot(horizontal, vertical, "x", color=ORANGE, markersize=7, markeredgewidth=1.8, clip_on=False)
