@@ -12,6 +12,16 @@ from magfem.typing import Floats
 
 
 @kernel
+def _add_sums(sums: tuple[float, ...], order: int, value: Floats, gradient: Floats) -> None:
+    """Add three sums to a vector and, from order 1, nine to a matrix, row by row."""
+    for i in range(3):
+        value[i] += sums[i]
+        if order > 0:
+            for j in range(3):
+                gradient[i, j] += sums[3 + 3 * i + j]
+
+
+@kernel
 def add_current(
     rx: float,
     ry: float,
@@ -116,19 +126,7 @@ def add_currents(
                 gzx += cz * ux - ky
                 gzy += cz * uy + kx
                 gzz += cz * uz
-    B[0] += bx
-    B[1] += by
-    B[2] += bz
-    if order > 0:
-        gradient[0, 0] += gxx
-        gradient[0, 1] += gxy
-        gradient[0, 2] += gxz
-        gradient[1, 0] += gyx
-        gradient[1, 1] += gyy
-        gradient[1, 2] += gyz
-        gradient[2, 0] += gzx
-        gradient[2, 1] += gzy
-        gradient[2, 2] += gzz
+    _add_sums((bx, by, bz, gxx, gxy, gxz, gyx, gyy, gyz, gzx, gzy, gzz), order, B, gradient)
 
 
 @kernel
@@ -175,7 +173,7 @@ def add_layers(
     hessian: Floats,
 ) -> None:
     """Add all elements `distant` (6, q, t), places then strengths, whose `share` (t,) is one, as `add_layer` does."""
-    if order > 0:
+    if order > 1:
         for q in range(distant.shape[1]):
             for t in range(distant.shape[2]):
                 if share[t] == 1.0:
@@ -183,18 +181,30 @@ def add_layers(
                     add_layer(x - e[0], y - e[1], z - e[2], e[3], e[4], e[5], order, A, gradient, hessian)
         return
     ax = ay = az = 0.0
+    gxx = gxy = gxz = gyx = gyy = gyz = gzx = gzy = gzz = 0.0
     for q in range(distant.shape[1]):
         px, py, pz = distant[0, q], distant[1, q], distant[2, q]
         sx, sy, sz = distant[3, q], distant[4, q], distant[5, q]
         for t in range(distant.shape[2]):
             rx, ry, rz = x - px[t], y - py[t], z - pz[t]
-            i1 = share[t] / np.sqrt(max(rx * rx + ry * ry + rz * rz, 1e-60))
-            ax += sx[t] * i1
-            ay += sy[t] * i1
-            az += sz[t] * i1
-    A[0] += ax
-    A[1] += ay
-    A[2] += az
+            inverse = 1.0 / max(rx * rx + ry * ry + rz * rz, 1e-60)
+            i1 = share[t] * np.sqrt(inverse)
+            kx, ky, kz = sx[t] * i1, sy[t] * i1, sz[t] * i1
+            ax += kx
+            ay += ky
+            az += kz
+            if order > 0:
+                ux, uy, uz = -inverse * rx, -inverse * ry, -inverse * rz
+                gxx += kx * ux
+                gxy += kx * uy
+                gxz += kx * uz
+                gyx += ky * ux
+                gyy += ky * uy
+                gyz += ky * uz
+                gzx += kz * ux
+                gzy += kz * uy
+                gzz += kz * uz
+    _add_sums((ax, ay, az, gxx, gxy, gxz, gyx, gyy, gyz, gzx, gzy, gzz), order, A, gradient)
 
 
 @summing_kernel
@@ -221,31 +231,31 @@ def add_patch_current(x: float, y: float, z: float, near: Floats, order: int, B:
         gzx += cz * ux - ky
         gzy += cz * uy + kx
         gzz += cz * uz
-    B[0] += bx
-    B[1] += by
-    B[2] += bz
-    if order > 0:
-        gradient[0, 0] += gxx
-        gradient[0, 1] += gxy
-        gradient[0, 2] += gxz
-        gradient[1, 0] += gyx
-        gradient[1, 1] += gyy
-        gradient[1, 2] += gyz
-        gradient[2, 0] += gzx
-        gradient[2, 1] += gzy
-        gradient[2, 2] += gzz
+    _add_sums((bx, by, bz, gxx, gxy, gxz, gyx, gyy, gyz, gzx, gzy, gzz), order, B, gradient)
 
 
 @summing_kernel
-def add_patch_layer(x: float, y: float, z: float, near: Floats, A: Floats) -> None:
-    """Add the elements `near` (6, q), places then strengths, as `add_layer` does to order 0."""
+def add_patch_layer(x: float, y: float, z: float, near: Floats, order: int, A: Floats, gradient: Floats) -> None:
+    """Add the elements `near` (6, q), places then strengths, as `add_layer` does to order 0 or 1."""
     ax = ay = az = 0.0
+    gxx = gxy = gxz = gyx = gyy = gyz = gzx = gzy = gzz = 0.0
     for q in range(near.shape[1]):
         rx, ry, rz = x - near[0, q], y - near[1, q], z - near[2, q]
-        i1 = 1.0 / np.sqrt(max(rx * rx + ry * ry + rz * rz, 1e-60))
-        ax += near[3, q] * i1
-        ay += near[4, q] * i1
-        az += near[5, q] * i1
-    A[0] += ax
-    A[1] += ay
-    A[2] += az
+        inverse = 1.0 / max(rx * rx + ry * ry + rz * rz, 1e-60)
+        i1 = np.sqrt(inverse)
+        kx, ky, kz = near[3, q] * i1, near[4, q] * i1, near[5, q] * i1
+        ax += kx
+        ay += ky
+        az += kz
+        if order > 0:
+            ux, uy, uz = -inverse * rx, -inverse * ry, -inverse * rz
+            gxx += kx * ux
+            gxy += kx * uy
+            gxz += kx * uz
+            gyx += ky * ux
+            gyy += ky * uy
+            gyz += ky * uz
+            gzx += kz * ux
+            gzy += kz * uy
+            gzz += kz * uz
+    _add_sums((ax, ay, az, gxx, gxy, gxz, gyx, gyy, gyz, gzx, gzy, gzz), order, A, gradient)

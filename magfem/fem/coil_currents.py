@@ -13,7 +13,7 @@ from operator import add
 
 import numpy as np
 
-from magfem.fem.sheet_currents import SheetCurrents
+from magfem.fem.sheet_currents import FACES, SheetCurrents
 from magfem.fields.filament import Filaments
 from magfem.fields.thick_solenoid import thick_solenoid_jet, thick_solenoid_vector_potential
 from magfem.typing import Floats, Jet, Points
@@ -66,7 +66,7 @@ class CoilCurrents:
         """(B, gradient[, hessian]) at `points` (n, 3) m, T/A."""
         jets = [
             self.sheets.jet(points, order) if self.sheets.count else None,
-            self.faces.layer_jet(points, order) if self.faces.count else None,
+            self.faces.layer_jet(points, order, FACES) if self.faces.count else None,
             self.filaments.jet(points, order) if self.filaments.current.size else None,
             *(self._winding_jet(winding, points, order) for winding in self.windings),
         ]

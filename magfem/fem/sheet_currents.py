@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -33,9 +34,23 @@ from magfem.fem.biot_savart import (
 from magfem.threads import in_chunks
 from magfem.typing import Floats, Jet, Points
 
-_FAR_RULE, _FAR = (3, 2), (5.5, 18.0)
-"""Gauss points along u and v, and the least distance, in half-lengths, at which they integrate a patch to 1e-6."""
-_NEAR_RULE, _NEAR, _NEAR_LAYER = (6, 3), (1.75, 6.0), (1.0, 3.0)
+
+class Rules(NamedTuple):
+    """Numbers of Gauss points along u and v, and the least distances, in half-lengths along u and v, that they serve.
+
+    n points on a half-length h integrate 1/distance at distance d up to (q + √(q² + 1))^(−2n), q = d/h.
+    """
+
+    far: tuple[int, int]
+    far_from: tuple[float, float]
+    near: tuple[int, int]
+    near_from: tuple[float, float]
+
+
+FIELD = Rules((3, 2), (5.5, 18.0), (6, 3), (1.75, 6.0))  # about 1e-6 of a patch's field
+POTENTIAL = Rules((3, 2), (5.5, 18.0), (6, 3), (1.0, 3.0))  # the same, of the smoother 1/r
+FACES = Rules((4, 3), (6.6, 15.8), (8, 5), (1.7, 3.9))  # about 1e-9, for faces of foil that nearly cancel each other
+
 _DEEPEST = 56  # halvings, of both directions together: a point on the sheet gets the mean of both sides
 _DEEPEST_LAYER = 18  # the same for 1/r, whose integral over what is left then is below 1e-7 of a patch's
 
@@ -70,11 +85,11 @@ class SheetCurrents:
 
     def jet(self, points: Points, order: int) -> Jet:
         """(B, gradient[, hessian]) at `points` (n, 3) m: ∫ K × r/r³ times µ0/4π."""
-        return self._integrals(points, order, layer=False)
+        return self._integrals(points, order, layer=False, rules=FIELD)
 
-    def layer_jet(self, points: Points, order: int) -> Jet:
+    def layer_jet(self, points: Points, order: int, rules: Rules = POTENTIAL) -> Jet:
         """(A, gradient[, hessian]) at `points` (n, 3) m: ∫ K/r times µ0/4π, the vector potential in T·m."""
-        return self._integrals(points, order, layer=True)
+        return self._integrals(points, order, layer=True, rules=rules)
 
     def vector_potential(self, points: Points) -> Floats:
         """A (n, 3) T·m in the Coulomb gauge."""
@@ -96,7 +111,7 @@ class SheetCurrents:
         total: Floats = 0.5 * np.cross(places, strengths).sum(axis=(0, 1))
         return total
 
-    def _integrals(self, points: Points, order: int, layer: bool) -> Jet:
+    def _integrals(self, points: Points, order: int, layer: bool, rules: Rules) -> Jet:
         points = np.ascontiguousarray(points, dtype=float)
         count = points.shape[0]
         value = np.zeros((count, 3))
@@ -104,9 +119,10 @@ class SheetCurrents:
         hessian = np.zeros((count if order > 1 else 0, 3, 3, 3))
         centre, half_u, half_v = self._extents()
         # One row for each coordinate, points of the rule before patches: the layout that vector units like.
-        distant = np.concatenate([array.transpose(2, 1, 0) for array in self.elements(_FAR_RULE)]).copy()
-        near = np.concatenate([array.transpose(0, 2, 1) for array in self.elements(_NEAR_RULE)], axis=1).copy()
-        (u, wu), (v, wv) = (_gauss(count) for count in _NEAR_RULE)
+        distant = np.concatenate([array.transpose(2, 1, 0) for array in self.elements(rules.far)]).copy()
+        near = np.concatenate([array.transpose(0, 2, 1) for array in self.elements(rules.near)], axis=1).copy()
+        (u, wu), (v, wv) = (_gauss(count) for count in rules.near)
+        limits = np.array([*rules.far_from, *rules.near_from])
 
         def run(chunk: slice) -> None:
             _evaluate(
@@ -119,6 +135,7 @@ class SheetCurrents:
                 distant,
                 near,
                 (u, v, wu, wv),
+                limits,
                 order,
                 layer,
                 value[chunk],
@@ -178,6 +195,7 @@ def _evaluate(
     distant: Floats,
     near: Floats,
     rule: tuple[Floats, Floats, Floats, Floats],
+    limits: Floats,
     order: int,
     layer: bool,
     value: Floats,
@@ -193,11 +211,8 @@ def _evaluate(
         reach_u, reach_v = np.sqrt((half_u[p] ** 2).sum()), np.sqrt((half_v[p] ** 2).sum())
         # Measured from the middle, whose distance exceeds that of the patch by less than its half-diagonal.
         radius = np.hypot(reach_u, reach_v)
-        far2[p] = (max(_FAR[0] * reach_u, _FAR[1] * reach_v) + radius) ** 2
-        if layer and order == 0:
-            near2[p] = (max(_NEAR_LAYER[0] * reach_u, _NEAR_LAYER[1] * reach_v) + radius) ** 2
-        else:
-            near2[p] = (max(_NEAR[0] * reach_u, _NEAR[1] * reach_v) + radius) ** 2
+        far2[p] = (max(limits[0] * reach_u, limits[1] * reach_v) + radius) ** 2
+        near2[p] = (max(limits[2] * reach_u, limits[3] * reach_v) + radius) ** 2
     stack = np.empty((_DEEPEST + 2, 5))
     work = np.empty((5, 3))
     leaf = np.empty((6, near.shape[2]))
@@ -223,7 +238,7 @@ def _evaluate(
             if dx * dx + dy * dy + dz * dz > near2[p]:
                 _add_points(x, y, z, near[p], order, layer, b, g, h)
             else:
-                _add_close(x, y, z, nodes[p], stream[p], rule, order, layer, stack, work, leaf, b, g, h)
+                _add_close(x, y, z, nodes[p], stream[p], rule, limits, order, layer, stack, work, leaf, b, g, h)
         for j in range(3):
             value[i, j] = MU_0 / (4.0 * np.pi) * b[j]
             if order > 0:
@@ -248,7 +263,7 @@ def _add_points(
     h: Floats,
 ) -> None:
     """Add the current elements `near` (6, q), places then strengths, of one patch or part of one."""
-    if order > 1 or (layer and order > 0):
+    if order > 1:
         for q in range(near.shape[1]):
             rx, ry, rz = x - near[0, q], y - near[1, q], z - near[2, q]
             if rx * rx + ry * ry + rz * rz == 0.0:
@@ -258,7 +273,7 @@ def _add_points(
             else:
                 add_current(rx, ry, rz, near[3, q], near[4, q], near[5, q], order, b, g, h)
     elif layer:
-        add_patch_layer(x, y, z, near, b)
+        add_patch_layer(x, y, z, near, order, b, g)
     else:
         add_patch_current(x, y, z, near, order, b, g)
 
@@ -271,6 +286,7 @@ def _add_close(
     nodes: Floats,
     stream: Floats,
     rule: tuple[Floats, Floats, Floats, Floats],
+    limits: Floats,
     order: int,
     layer: bool,
     stack: Floats,
@@ -310,10 +326,7 @@ def _add_close(
             a, c = 0.5 * (east[i] - west[i]), 0.5 * (north[i] - south[i])
             r = (x if i == 0 else y if i == 1 else z) - middle[i]
             d2 += (r - s * a - t * c) ** 2
-        if layer and order == 0:  # 1/r is smoother
-            need_u, need_v = _NEAR_LAYER[0] ** 2 * aa, _NEAR_LAYER[1] ** 2 * bb
-        else:
-            need_u, need_v = _NEAR[0] ** 2 * aa, _NEAR[1] ** 2 * bb
+        need_u, need_v = limits[2] ** 2 * aa, limits[3] ** 2 * bb
         if d2 < max(need_u, need_v) and depth < deepest:
             if need_u >= need_v:
                 stack[height, :] = (u0, um, v0, v1, depth + 1)
