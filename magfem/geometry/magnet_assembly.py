@@ -186,11 +186,12 @@ def _rotation(entry: Table) -> Vector:
     table = entry.table("rotation")
     table.only("axis", "angle")
     axis = np.array(three_numbers(table, "axis"))
-    length = float(np.linalg.norm(axis))
-    if not 0 < length < np.inf:
+    largest = float(np.abs(axis).max())
+    if not 0 < largest < np.inf:
         raise table.error("axis must be three finite numbers that are not all zero", "axis")
+    axis /= largest  # squares neither overflow nor vanish
     angle = table.quantity("angle", "angle")
     if not abs(angle) <= 2 * pi * (1 + 1e-9):
         raise table.error("angle must lie within ±360°", "angle")
-    x, y, z = (axis / length * angle).tolist()
+    x, y, z = (axis / np.linalg.norm(axis) * angle).tolist()
     return x, y, z

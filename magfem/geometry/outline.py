@@ -15,7 +15,7 @@ from magfem.geometry.clearances import crosses_itself, signed_area, smallest_gap
 from magfem.geometry.device import length_text
 from magfem.geometry.foil_coil import Winding
 from magfem.geometry.foil_ribbon import Ribbon
-from magfem.geometry.limits import LONGEST, InvalidValue, check_length, check_number
+from magfem.geometry.limits import LONGEST, ROUNDING, InvalidValue, check_length, check_number
 from magfem.geometry.polar_spiral import PolarSpiral, flower, narrowing
 from magfem.geometry.polyline_track import (
     CrampedTrack,
@@ -314,7 +314,7 @@ class Polygon:
             raise InvalidValue(f"{subject}: an outline needs three points that are not in line", key)
         if np.abs(corners).max() > LONGEST:
             raise InvalidValue(f"{subject}: an outline must lie within {format_quantity(LONGEST, 'length')}", key)
-        if crosses_itself(corners):
+        if crosses_itself(self._distinct):
             raise InvalidValue(f"{subject}: the outline crosses or touches itself", key)
         legs = np.roll(corners, -1, axis=0) - corners
         angles = np.arctan2(legs[:, 1], legs[:, 0])
@@ -335,12 +335,21 @@ class Polygon:
             return False
 
     @property
-    def _corners(self) -> Floats:
-        """The corners (n, 2) m about the origin, right-handed; points in line with their neighbours left out."""
+    def _distinct(self) -> Floats:
+        """The points (n, 2) m about the origin, right-handed; those that repeat the one before left out."""
         points = np.array(self.points, dtype=float).reshape(-1, 2)
         points = points - 0.5 * (points.min(axis=0) + points.max(axis=0))
+        steps = np.abs(np.roll(points, -1, axis=0) - points).max(axis=1)
+        if (steps > 0).any():
+            points = points[steps > ROUNDING * np.abs(points).max()]
         if signed_area(points) < 0:
             points = np.roll(points[::-1], 1, axis=0)
+        return points
+
+    @property
+    def _corners(self) -> Floats:
+        """Those of the distinct points that are not in line with their neighbours, (n, 2) m."""
+        points = self._distinct
         before, after = points - np.roll(points, 1, axis=0), np.roll(points, -1, axis=0) - points
         bend = np.abs(before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0])
         kept: Floats = points[bend > _IN_LINE * np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)]
@@ -416,6 +425,8 @@ def _read_polygon(table: Table) -> Polygon:
     points = table.value("points")
     if not isinstance(points, list) or len(points) < 3:
         raise table.error('points must be three or more of ["4 mm", "-2 mm"]', "points")
+    if len(points) > _MOST_POINTS + 1:  # before the units of all are read; one for a closed outline
+        raise table.error(f"an outline has at most {_MOST_POINTS} points, got {len(points)}", "points")
     places = tuple(_two_lengths(table, "points", point) for point in points)
     return Polygon(places[:-1] if places[0] == places[-1] else places, _corner_radius(table))
 

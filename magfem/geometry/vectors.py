@@ -39,7 +39,10 @@ def three_numbers(table: Table, key: str) -> Vector:
     value = table.value(key)
     if not (is_triple(value) and all(isinstance(one, int | float) and not isinstance(one, bool) for one in value)):  # type: ignore[attr-defined]
         raise table.error(f"{key} must be three numbers such as [0, 0, 1], got {_shown(value)}", key)
-    x, y, z = map(float, value)  # type: ignore[call-overload]
+    try:
+        x, y, z = map(float, value)  # type: ignore[call-overload]
+    except OverflowError:
+        raise table.error(f"{key} must be three finite numbers", key) from None
     return x, y, z
 
 

@@ -116,6 +116,15 @@ def test_other_spirals_are_right_handed_too(name: str) -> None:
     assert z > 100 * max(abs(x), abs(y))
 
 
+def test_repeated_and_aligned_points_of_an_outline_are_of_no_account() -> None:
+    corners = [(-5e-3, -5e-3), (5e-3, -5e-3), (5e-3, 5e-3), (-5e-3, 5e-3)]
+    repeated = [corners[0], corners[0], (0.0, -5e-3), corners[1], *corners[2:], corners[3], corners[0]]
+    bare = dict(outer_diameter=None, inner_diameter=None, turns=3)
+    one, other = (spiral(outline=Polygon(tuple(points)), **bare) for points in (corners, repeated))
+    assert other.winding.length == pytest.approx(one.winding.length, rel=1e-12)
+    assert other.winding.size == pytest.approx((10e-3, 10e-3), rel=1e-12)
+
+
 @pytest.mark.parametrize("name", ["planar_coil_12mm", "flower_coil_20mm", "rectangular_spiral_20x12"])
 def test_turns_keep_their_gap(name: str) -> None:
     """Nearest edge points of the turn before, from a dense sampling of the edges."""
@@ -297,6 +306,21 @@ STATOR = card("stator_1.6x5.5")
             "",
             "",
             "crosses or touches itself",
+            "outline.points",
+        ),
+        (
+            BARE
+            + POINTS.format('["0 mm", "0 mm"], ["9 mm", "0 mm"], ["7 mm", "0 mm"], ["7 mm", "9 mm"], ["0 mm", "9 mm"]'),
+            "",
+            "",
+            "crosses or touches itself",
+            "outline.points",
+        ),
+        (
+            BARE + POINTS.format(", ".join(['["0 mm", "0 mm"]'] * 1002)),
+            "",
+            "",
+            "at most 1000 points, got 1002",
             "outline.points",
         ),
         (

@@ -359,6 +359,11 @@ dimensions = {{ size = ["4 mm", "4 mm", "4 mm"] }}
         ('position = ["4 mm", "0 mm"]', "position must be three lengths", "magnets[1].position"),
         ('position = ["4 mm", "0 mm", "0 deg"]', "expected a length", "magnets[1].position"),
         ("rotation = { axis = [0, 0, 0], angle = '30 deg' }", "axis must be", "magnets[1].rotation.axis"),
+        (
+            f"rotation = {{ axis = [0, 0, {10**400}], angle = '30 deg' }}",
+            "three finite numbers",
+            "magnets[1].rotation.axis",
+        ),
         ("rotation = { axis = [0, 0, 1], angle = '30 mm' }", "expected an angle", "magnets[1].rotation.angle"),
         ("rotation = [0, 0, 1]", "expected an angle", "magnets[1].rotation"),
         ("colour = 1", 'unknown key "colour"', "magnets[1].colour"),
