@@ -11,8 +11,9 @@ from magfem.fields.field import Field
 from magfem.geometry import Coil, CoilArray, FoilTrack, Stator
 from magfem.typing import Floats, Points
 
-_BALL = 4000  # points that stand for a ball
-_DIRECTIONS, _DEPTHS = 200, 60  # rays in which the homogeneous volume is looked for, and places along each
+_BALL = 1500  # points that stand for a ball
+_RADII, _ANGLES, _LEVELS = 4, 16, 7  # points that stand for a cylinder
+_DIRECTIONS, _DEPTHS = 120, 24  # rays in which the homogeneous volume is looked for, and places along each
 
 
 @dataclass(frozen=True)
@@ -70,12 +71,10 @@ def _turns(geometry: Coil, circuit: str) -> float | None:
     return None if turns is None else float(turns) * float(getattr(coil, "layers", 1))
 
 
-def deviation(field: Field, centre: Points, points: Points) -> Floats:
-    """|B − B(centre)| / |B(centre)| (...) at `points` (..., 3) m; `centre` (3,) m. Infinite where the centre has
-    no field."""
-    middle = field.B(centre)
+def deviation(B: Floats, middle: Floats) -> Floats:
+    """|B − B₀| / |B₀| (...) of fields B (..., 3) from that at the centre, `middle` (3,); infinite where B₀ vanishes."""
     size = float(np.linalg.norm(middle))
-    apart: Floats = np.linalg.norm(field.B(points) - middle, axis=-1)
+    apart: Floats = np.linalg.norm(B - middle, axis=-1)
     return apart / size if size > 0 else np.full(apart.shape, math.inf)
 
 
@@ -95,12 +94,11 @@ def directions(count: int) -> Floats:
     return np.stack([rho * np.cos(angle), rho * np.sin(angle), z], axis=-1)
 
 
-def cylinder(diameter: float, length: float, count: int = _BALL) -> Points:
-    """Points (n, 3) m that fill a cylinder about z and cover its wall and faces, about `count` of them."""
-    steps = max(4, round((count / 12) ** (1 / 3)))
-    rho = 0.5 * diameter * np.sqrt(np.linspace(0.0, 1.0, 2 * steps))
-    angle = 2 * np.pi * np.arange(6 * steps) / (6 * steps)
-    z = 0.5 * length * np.linspace(-1.0, 1.0, 2 * steps)
+def cylinder(diameter: float, length: float) -> Points:
+    """Points (n, 3) m that fill a cylinder about z evenly and cover its wall and faces."""
+    rho = 0.5 * diameter * np.sqrt(np.linspace(0.0, 1.0, _RADII))
+    angle = 2 * np.pi * np.arange(_ANGLES) / _ANGLES
+    z = 0.5 * length * np.linspace(-1.0, 1.0, _LEVELS)
     r, a, h = np.meshgrid(rho, angle, z, indexing="ij")
     return np.stack([r * np.cos(a), r * np.sin(a), h], axis=-1).reshape(-1, 3)
 
@@ -112,15 +110,19 @@ def homogeneous_volume(field: Field, centre: Points, reach: float, limit: float 
     which the deviation is interpolated.
     """
     rays = directions(_DIRECTIONS)
-    depth = reach * np.linspace(0.0, 1.0, _DEPTHS + 1)
-    found = deviation(field, centre, centre + depth[:, None, None] * rays)  # (depths, rays)
-    beyond = found > limit
-    first = np.where(beyond.any(axis=0), beyond.argmax(axis=0), _DEPTHS)
-    before = np.maximum(first - 1, 0)
-    ray = np.arange(_DIRECTIONS)
-    low, high = found[before, ray], found[first, ray]
-    share = np.where(high > limit, (limit - low) / np.where(high > low, high - low, 1.0), 1.0).clip(0, 1)
-    radius = depth[before] + share * (depth[first] - depth[before])
+    step = reach / _DEPTHS
+    middle = field.B(centre)
+    radius = np.full(_DIRECTIONS, reach)
+    inside = np.arange(_DIRECTIONS)  # the rays that have not exceeded the limit yet
+    low = np.zeros(_DIRECTIONS)
+    for depth in step * np.arange(1, _DEPTHS + 1):
+        high = deviation(field.B(centre + depth * rays[inside]), middle)
+        beyond = high > limit
+        share = (limit - low[beyond]) / (high[beyond] - low[beyond])
+        radius[inside[beyond]] = depth - step * (1 - share)
+        inside, low = inside[~beyond], high[~beyond]
+        if not inside.size:
+            break
     return float(4 * math.pi / 3 * (radius**3).mean())
 
 

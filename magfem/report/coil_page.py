@@ -178,8 +178,9 @@ def _places(solution: CoilSolution, place: Workplace) -> list[dict[str, Any]]:
     found = []
     for name, field in _whole(solution):
         for part in place.places:
-            size = np.linalg.norm(field.B(part.points), axis=-1)
-            apart = float(deviation(field, place.centre, part.points).max())
+            B = field.B(part.points)
+            size = np.linalg.norm(B, axis=-1)
+            apart = float(deviation(B, field.B(place.centre)).max())
             found.append(
                 {
                     "circuit": name,

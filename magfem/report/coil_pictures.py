@@ -20,7 +20,7 @@ from magfem.report.surface import Surface
 from magfem.report.workplace import Workplace
 from magfem.typing import Floats
 
-_COUNTS = (72, 36)  # samples along the side of a map: near a coil of foil each of them is an integral
+_COUNTS = (56, 30)  # samples along the side of a map: near a coil of foil each of them is an integral
 log = logging.getLogger("magfem")
 
 

@@ -108,7 +108,7 @@ def _above(geometry: Coil) -> Workplace:
             Line("z", np.array([0.0, 0.0, top]), region.clearance, region.extent),
             Line("x", centre, -window, window),
         ),
-        places=tuple(Place(f"disc of radius {size(share * half)}", disc(centre, share * half)) for share in _DISCS),
+        places=tuple(Place(f"disc of radius {size(share * half, 3)}", disc(centre, share * half)) for share in _DISCS),
         reach=chosen,
     )
 
@@ -126,7 +126,7 @@ def _bore(geometry: Stator) -> Workplace:
         places=tuple(
             Place(
                 f"cylinder ⌀ {size(wide * bore.diameter, 3)}, {size(part * long, 3)} long",
-                cylinder(wide * bore.diameter, part * long, 1500),
+                cylinder(wide * bore.diameter, part * long),
             )
             for wide, part in parts
         ),
@@ -150,8 +150,6 @@ def _within(geometry: Coil) -> Workplace:
             Line("z", centre, -float(np.abs(nodes[:, 2]).max()) - far, float(np.abs(nodes[:, 2]).max()) + far),
             Line("x", centre, -min(free, wide), min(free, wide)),
         ),
-        places=tuple(
-            Place(f"ball of radius {size(share * free)}", ball(centre, share * free, 1500)) for share in _BALLS
-        ),
+        places=tuple(Place(f"ball of radius {size(share * free, 3)}", ball(centre, share * free)) for share in _BALLS),
         reach=free,
     )

@@ -36,7 +36,9 @@ def line_figure(fields: Sequence[tuple[str, Field, Floats]], line: Line, where: 
             below.plot(place * MILLI, slope, color=colour)
         for axes in (above, below):
             grid(axes)
-            axes.axhline(0, color=INK, linewidth=0.6)
+            low, high = axes.get_ylim()
+            if low < 0.2 * (high - low) and high > -0.2 * (high - low):
+                axes.axhline(0, color=INK, linewidth=0.6)
         name = "B" if len(fields) > 1 else f"B_{{{component}}}"
         above.set_ylabel(f"${name}$ (mT/A)")
         below.set_ylabel(f"$∂{name}/∂{line.axis}$ (T/m/A)")

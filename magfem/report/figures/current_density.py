@@ -17,7 +17,7 @@ from magfem.typing import Booleans, Floats, Points
 MILLI = 1e3
 _FINE = 2  # cells to each half of a patch
 _CLOSE = 9.0  # track widths, half the side of the close view
-_MAP = "magma_r"
+_MAP = "YlOrRd"
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class DensityMap:
 def density_map(circuit: Circuit, sheets: SheetCurrents) -> DensityMap | None:
     """Of the turns of a foil circuit, leads apart; None when it is not of foil or was not solved as a sheet.
 
-    Two sheets stand for each foil's thickness, each with half of the current: their patches lie over each other.
+    Two sheets stand for each foil's thickness, each with half of the current: the upper one is taken.
     """
     tracks = [part for part in circuit.parts if isinstance(part, FoilTrack)]
     if not sheets.count or len(tracks) < len(circuit.parts):
@@ -103,7 +103,7 @@ def density_figures(found: DensityMap, name: str) -> tuple[Picture, Picture]:
 
 
 def _cells(axes: Axes, corners: Floats, density: Floats, mean: float, top: float) -> PolyCollection:
-    cells = PolyCollection(list(corners), array=density, cmap=_MAP, norm=Normalize(0.4 * mean, min(top, 2.5 * mean)))
+    cells = PolyCollection(list(corners), array=density, cmap=_MAP, norm=Normalize(0.5 * mean, min(top, 2.0 * mean)))
     cells.set_edgecolor("face")
     cells.set_linewidth(0.2)
     axes.add_collection(cells)
@@ -132,11 +132,11 @@ def _level(nodes: Floats, rolled: bool) -> Floats:
 
 
 def _turns(track: FoilTrack, level: Floats, rolled: bool) -> Booleans:
-    """Which patches belong to the turns of a track: those that lie in its foil."""
+    """Which patches belong to the turns of a track: those in the upper (outer) half of its foil."""
     stations = track.stations(0.5)
     middle = 0.5 * (stations.left + stations.right)[1::2][~stations.lead]
     own = float(np.median(_level(middle, rolled)))
-    inside: Booleans = np.all(np.abs(level - own) < 0.5 * track.thickness, axis=1)
+    inside: Booleans = np.all((level > own) & (level < own + 0.5 * track.thickness), axis=1)
     return inside
 
 

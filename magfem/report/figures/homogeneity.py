@@ -13,7 +13,7 @@ from magfem.report.surface import Surface
 from magfem.typing import Points
 
 MILLI = 1e3
-_MAP = 64
+_MAP = 48
 _LEVELS = (0.0, 0.001, 0.01, 0.05, 0.1, 0.2, 0.5)
 _COLOURS = ("#0b4f7d", "#2b7bb0", "#6aaed6", "#b5d4e9", "#dfecf6", "#f3f7fb")
 
@@ -21,7 +21,7 @@ _COLOURS = ("#0b4f7d", "#2b7bb0", "#6aaed6", "#b5d4e9", "#dfecf6", "#f3f7fb")
 def homogeneity_figure(field: Field, centre: Points, plane: Plane, surfaces: tuple[Surface, ...]) -> Picture:
     """|B − B(centre)| / |B(centre)| in steps."""
     side, points = plane.points(_MAP)
-    found = deviation(field, centre, points)
+    found = deviation(field.B(points), field.B(centre))
     with drawing():
         drawn, axes, bar_axes = square()
         colours = ListedColormap(_COLOURS).with_extremes(over="white")

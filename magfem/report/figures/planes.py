@@ -85,7 +85,14 @@ def field_planes(geometry: Geometry, surfaces: tuple[Surface, ...]) -> tuple[Pla
     return Plane("x", "z", half), Plane("x", "y", half)
 
 
-def field_map(field: Field, surfaces: tuple[Surface, ...], plane: Plane, name: str = "", caption: str = "") -> Picture:
+def field_map(
+    field: Field,
+    surfaces: tuple[Surface, ...],
+    plane: Plane,
+    name: str = "",
+    caption: str = "",
+    counts: tuple[int, int] = (_MAP, _LINES),
+) -> Picture:
     """|B| in colours, the direction of its part in the plane as field lines, the device's outline.
 
     name, caption: of the picture, where those of a magnet do not fit.  counts: samples along a side, of |B| and of the
