@@ -16,6 +16,7 @@ from magfem.errors import InputError
 from magfem.typing import Booleans, Floats, Integers, Points
 
 _SIDES = ((0, 1), (1, 2), (2, 0))
+_SKIN = 1e-4  # of a facet's size, how far within it a body is probed
 _STRAIGHT = 1e-9  # of a facet's size: mid-edge nodes nearer to the middle are in it
 # Dunavant's rule of degree 4 on the unit triangle: exact for x·n dS of a curved facet.
 _A, _B = 0.445948490915965, 0.091576213509771
@@ -118,6 +119,29 @@ class BodySurfaces:
                     f"facets of {bodies} cross, or touch without sharing their corners, near {self._place(there)}"
                 )
 
+    def check_cover(self) -> None:
+        """Raise InputError unless just within every sheet of every body there is this body, once.
+
+        Bodies within others do not cross them, nor do sheets that are inside out; only the count of bodies tells.
+        """
+        shells = [self.points[self.of_body(index)[:, :3]] for index in range(len(self.names))]
+        for index, name in enumerate(self.names):
+            triangles, sheet = shells[index], _sheets(self.of_body(index)[:, :3])
+            normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+            size = np.linalg.norm(normal, axis=1)
+            for one in range(int(sheet.max()) + 1):
+                largest = int(np.argmax(np.where(sheet == one, size, -1.0)))
+                middle = triangles[largest].mean(axis=0)
+                probe = middle - normal[largest] * (_SKIN / np.sqrt(size[largest]))
+                cover = [round(winding(probe, shell)) for shell in shells]
+                if cover[index] == 1 and sum(map(abs, cover)) == 1:
+                    continue
+                place = "({:.4g}, {:.4g}, {:.4g}) m".format(*middle)
+                others = [other for k, other in enumerate(self.names) if k != index and cover[k]]
+                if others:
+                    raise InputError(f"bodies {name!r} and {others[0]!r} overlap, near {place}")
+                raise InputError(f"body {name!r}: it overlaps itself, or a sheet of it is inside out, near {place}")
+
     def _place(self, nodes: Integers) -> str:
         x, y, z = self.points[nodes].mean(axis=0)
         return f"({x:.4g}, {y:.4g}, {z:.4g}) m"
@@ -171,6 +195,32 @@ def merged(points: Points, cells: Integers) -> tuple[Points, Integers]:
     _, first, same = np.unique(np.round((points - points.min(axis=0)) / (1e-9 * size)), axis=0, return_index=True,
                                return_inverse=True)  # fmt: skip
     return points[first], same.ravel()[numbered.reshape(cells.shape)]
+
+
+def winding(point: Floats, triangles: Floats) -> float:
+    """How often a closed surface (f, 3, 3) winds around the point (3,): 1 within an outward one, 0 outside.
+
+    The sum of solid angles (van Oosterom & Strackee 1983) over 4π.
+    """
+    a, b, c = (triangles[:, k] - point for k in range(3))
+    la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
+    ab, bc, ca = (np.einsum("ei,ei->e", u, v) for u, v in ((a, b), (b, c), (c, a)))
+    angle = 2 * np.arctan2(np.einsum("ei,ei->e", np.cross(a, b), c), la * lb * lc + ab * lc + bc * la + ca * lb)
+    return float(angle.sum() / (4 * np.pi))
+
+
+def _sheets(corners: Integers) -> Integers:
+    """Number (f,) of the sheet that each facet of a closed surface belongs to, as edges join them."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    edges = np.sort(corners[:, _SIDES].reshape(-1, 2), axis=1)
+    _, same = np.unique(edges, axis=0, return_inverse=True)
+    first, second = np.argsort(same.ravel(), kind="stable").reshape(-1, 2).T // 3  # every edge has two facets
+    count = len(corners)
+    graph = coo_array((np.ones(first.size), (first, second)), shape=(count, count))
+    sheets: Integers = connected_components(graph, directed=False)[1]
+    return sheets
 
 
 def _near(points: Points, edges: Integers, corners: Integers) -> Iterator[tuple[Integers, Integers]]:

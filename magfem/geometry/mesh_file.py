@@ -56,6 +56,8 @@ def read_bodies(
     if quadratic and len({mesh.cells[n].type for n in chosen}) > 1:
         raise InputError("expected cells of one kind, found straight and curved ones together")
     cells = np.concatenate([np.asarray(mesh.cells[n].data, dtype=np.int64) for n in chosen])[owner >= 0]
+    if cells.min(initial=0) < 0 or cells.max(initial=-1) >= len(mesh.points):
+        raise InputError(f"cells name nodes that the file does not have: it has {len(mesh.points)}")
     points, cells = merged(np.column_stack([mesh.points, np.zeros((len(mesh.points), 3))])[:, :3] * scale, cells)
     owner = owner[owner >= 0]
     if not np.isfinite(points).all():
@@ -69,6 +71,7 @@ def read_bodies(
     surfaces = _between(names, points, facets, owner)
     surfaces.check()
     surfaces.check_apart()
+    surfaces.check_cover()
     return surfaces
 
 
@@ -79,13 +82,20 @@ def _read(file: Path) -> Any:
         raise InputError("no such mesh file")
     formats: tuple[str | None, ...] = ("gmsh", "ansys") if file.suffix.lower() == ".msh" else (None,)
     reason = ""
+    said = io.StringIO()
     for form in formats:
         try:
-            # meshio writes what it thinks to stdout and ends the program when it cannot read a file.
-            with warnings.catch_warnings(action="ignore"), contextlib.redirect_stdout(io.StringIO()) as said:
+            # meshio writes what it thinks to both streams and ends the program when it cannot read a file.
+            with (
+                warnings.catch_warnings(action="ignore"),
+                contextlib.redirect_stdout(said),
+                contextlib.redirect_stderr(said),
+            ):
                 return meshio.read(file, file_format=form)
         except (Exception, SystemExit) as error:  # its readers raise whatever they stumble over
-            what = said.getvalue() if isinstance(error, SystemExit) else str(error)
+            what = (
+                "its contents are not of the format that its name says" if isinstance(error, SystemExit) else str(error)
+            )
             reason = reason or one_line(" ".join(what.split()))[:80] or type(error).__name__
     raise InputError(f"meshio cannot read this mesh: {reason}")
 

@@ -18,11 +18,11 @@ from magfem.geometry.body_surfaces import BodySurfaces
 from magfem.geometry.card import CardOrigin, Table
 from magfem.geometry.catalogue import folder
 from magfem.geometry.device import Device, header_from_card, two_digits
-from magfem.geometry.limits import InvalidValue, check_length
+from magfem.geometry.limits import LONGEST, SHORTEST, InvalidValue
 from magfem.geometry.material import PermanentMagnet
 from magfem.geometry.mesh_file import read_bodies
 from magfem.typing import Floats, Points
-from magfem.units import describe, format_quantity, quantity
+from magfem.units import describe, format_quantity, quantity, shortened
 
 _OFF_CENTRE = 3.0
 """Radius of the ball about the origin over that of the ball around the bodies, at most."""
@@ -56,7 +56,13 @@ class MeshedMagnets(Device):
         corners = self.corners
         low, high = corners.min(axis=0), corners.max(axis=0)
         largest = float((high - low).max())
-        check_length(self.words, "mesh.unit", largest)
+        if not SHORTEST <= largest <= LONGEST:
+            shortest, longest, got = (format_quantity(value, "length") for value in (SHORTEST, LONGEST, largest))
+            raise InvalidValue(
+                f"{self.words}: in this unit the bodies' largest dimension is {got}, which must lie between {shortest} "
+                f"and {longest}",
+                "mesh.unit",
+            )
         centre = (low + high) / 2
         if self.hull.radius > _OFF_CENTRE * float(np.linalg.norm(corners - centre, axis=1).max()):
             words = ", ".join(f'"{format_quantity(value, "length")}"' for value in centre)
@@ -190,7 +196,7 @@ def _from_file(card: Table, mesh: Table, numbers: dict[str, int | None], scale: 
     except CardError:
         raise
     except (InputError, OSError) as error:
-        raise mesh.error(f"{mesh.text('file')}: {error}", "file") from None
+        raise mesh.error(f"{shortened(mesh.text('file'))}: {error}", "file") from None
     return replace(surfaces, points=surfaces.points - _origin(mesh)), digest
 
 

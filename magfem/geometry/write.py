@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from hashlib import sha256
 from typing import Any
 
@@ -66,15 +67,20 @@ def _fresh_card(geometry: Geometry) -> str:
 
 def _lines(table: dict[str, Any], path: str = "") -> list[str]:
     """A TOML table, plain values before the tables within it."""
-    lines = [f"{key} = {_value(value)}" for key, value in table.items() if not _is_table(value)]
+    lines = [f"{_key(key)} = {_value(value)}" for key, value in table.items() if not _is_table(value)]
     for key, value in table.items():
         if not _is_table(value):
             continue
-        name = f"{path}.{key}" if path else key
+        name = f"{path}.{_key(key)}" if path else _key(key)
         several = isinstance(value, list)
         for entry in value if several else [value]:
             lines += ["", f"[[{name}]]" if several else f"[{name}]", *_lines(entry, name)]
     return lines
+
+
+def _key(key: str) -> str:
+    """As TOML writes a key: bare where it may be, else in quotes."""
+    return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else _value(key)
 
 
 def _is_table(value: object) -> bool:
@@ -83,5 +89,5 @@ def _is_table(value: object) -> bool:
 
 
 def _value(value: object) -> str:
-    """Texts, numbers, booleans and lists of them: JSON's way to write them is TOML's as well."""
-    return json.dumps(value, ensure_ascii=False)
+    """Texts, numbers, booleans and lists of them: JSON's way to write them is TOML's as well, but for one character."""
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, cKDTree
 
 from magfem.errors import InputError, MeshError
-from magfem.geometry.body_surfaces import BodySurfaces
+from magfem.geometry.body_surfaces import BodySurfaces, winding
 from magfem.mesh.mesh import Mesh
 from magfem.mesh.refine_surface import refine
 from magfem.mesh.session import gmsh_session
@@ -175,11 +175,7 @@ def _regions(points: Points, facets: Integers, inner: Integers, outer: Integers,
 
 def _inside(point: Floats, triangles: Floats) -> bool:
     """Whether a closed surface (f, 3, 3) winds around the point (3,)."""
-    a, b, c = (triangles[:, k] - point for k in range(3))
-    la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
-    ab, bc, ca = (np.einsum("ei,ei->e", u, v) for u, v in ((a, b), (b, c), (c, a)))
-    angle = 2 * np.arctan2(np.einsum("ei,ei->e", np.cross(a, b), c), la * lb * lc + ab * lc + bc * la + ca * lb)
-    return bool(abs(angle.sum()) > 2 * np.pi)
+    return abs(winding(point, triangles)) > 0.5
 
 
 def _fill(points: Points, regions: Regions, outer: float) -> tuple[Points, Integers, Integers]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import meshio
 import numpy as np
 import pytest
@@ -28,6 +30,14 @@ magnetisation = [0, 0, 1]
 _CORNERS = np.array([[x, y, z] for x in (0, 2) for y in (0, 3) for z in (0, 4)], dtype=float)
 _PATHS = [(4, 2), (4, 1), (2, 4), (2, 1), (1, 4), (1, 2)]
 _TETRAHEDRA = np.array([[0, a, a + b, 7] for a, b in _PATHS])
+
+# Its surface: what only one tetrahedron has, seen from outside.
+_SIDES = np.sort(_TETRAHEDRA[:, [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]]].reshape(-1, 3), axis=1)
+_UNIQUE, _COUNT = np.unique(_SIDES, axis=0, return_counts=True)
+_TETRAHEDRA_FACES = np.array(
+    [side if np.linalg.det(_CORNERS[side] - [1, 1.5, 2]) > 0 else side[::-1] for side in _UNIQUE[_COUNT == 1]]
+)
+_FACES = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])  # of a tetrahedron, seen from outside
 
 
 @pytest.fixture
@@ -113,6 +123,16 @@ def test_bodies_that_touch_share_their_facets(card, tmp_path):
             np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0.1, 0.1, 0.5]]),
             "cells overlap or are inside out",
         ),
+        (  # a tetrahedron all inside another
+            [("tetra", np.array([[0, 1, 2, 3], [4, 5, 6, 7]]))],
+            np.vstack([np.zeros((1, 3)), np.eye(3), np.full((1, 3), 0.1), 0.1 * np.eye(3) + 0.1]),
+            "overlaps itself",
+        ),
+        (  # two apart, the second inside out
+            [("triangle", np.vstack([_FACES, _FACES[:, ::-1] + 4]))],
+            np.vstack([np.zeros((1, 3)), np.eye(3), np.full((1, 3), 3.0), np.eye(3) * 0.5 + 3]),
+            "a sheet of it is inside out",
+        ),
         (  # one tetrahedron's tip inside another
             [("tetra", np.array([[0, 1, 2, 3], [4, 5, 6, 7]]))],
             np.vstack([np.zeros(3), np.eye(3), np.full(3, 0.2), np.eye(3) + 1]),
@@ -133,6 +153,60 @@ def test_bodies_that_touch_with_other_facets_are_refused(card, tmp_path):
     cells = [("tetra", np.vstack([_TETRAHEDRA, _TETRAHEDRA + 8]))]
     with pytest.raises(CardError, match="touch without sharing their corners"):
         card(points=points, cells=cells)
+
+
+def test_bodies_inside_others_need_a_cavity(card, tmp_path):
+    """Nested surfaces do not cross; with the cavity's own surface the outer body is hollow and all is well."""
+    solid, hole = _CORNERS - [1, 1.5, 2], 0.5 * (_CORNERS - [1, 1.5, 2])
+    outer, half = np.vstack([_TETRAHEDRA_FACES, _TETRAHEDRA_FACES[:, ::-1] + 8]), 0.5 * hole
+    for count, cells, message in (
+        (
+            len(_TETRAHEDRA_FACES),
+            np.vstack([_TETRAHEDRA_FACES, _TETRAHEDRA_FACES + 16]),
+            "'inside' and 'magnet' overlap",
+        ),
+        (len(outer), np.vstack([outer, _TETRAHEDRA_FACES + 16]), None),
+    ):
+        owner = np.where(np.arange(len(cells)) < count, 1, 2)
+        more = dict(
+            points=np.vstack([solid, hole, half]),
+            cells=[("triangle", cells)],
+            cell_data={"body": [owner]},
+            own='id = 1\n[bodies.inside]\nid = 2\nremanence = "1 T"\nmagnetisation = "axial"',
+        )
+        if message:
+            with pytest.raises(CardError, match=message):
+                card(**more)
+        else:
+            assert card(**more).volume == pytest.approx((24 - 3 + 24 / 64) * 1e-9, rel=1e-12)
+
+
+def test_cells_of_nodes_that_are_not_there_are_refused(card):
+    cells = np.array([[0, 1, 2, 9]])
+    with pytest.raises(CardError, match="nodes that the file does not have"):
+        card(cells=[("tetra", cells)])
+
+
+def test_programs_that_end_themselves_say_nothing(card, tmp_path, capfd):
+    card()
+    (tmp_path / "part.vtu").write_text("no mesh")
+    with pytest.raises(CardError, match="not of the format that its name says"):
+        load_geometry(tmp_path / "card.toml")
+    assert capfd.readouterr() == ("", "")
+
+
+def test_units_that_make_no_magnet_are_named(card, tmp_path):
+    card()
+    text = (tmp_path / "card.toml").read_text()
+    (tmp_path / "card.toml").write_text(text.replace('"mm"', '"km"'))
+    with pytest.raises(CardError, match="largest dimension is 4 km"):
+        load_geometry(tmp_path / "card.toml")
+
+
+def test_names_that_need_quotes_are_written_with_them(card):
+    magnets = replace(card(body='"my body.1"', own="id = 1", cell_data={"body": [np.ones(6, dtype=int)]}), origin=None)
+    again = geometry_from_text(card_text(magnets), "anew")
+    assert again.surfaces == magnets.surfaces and again.surfaces.names == ("my body.1",)
 
 
 def test_inward_triangles_are_turned(card):
