@@ -15,7 +15,8 @@ from magfem.geometry.sector import Sector
 from magfem.geometry.single_magnet import SingleMagnet
 from magfem.units import format_quantity
 
-SMALLEST_ANGLE = pi / 180
+SMALLEST_ANGLE = pi / 180  # rad, of a segment, and of what it lacks to a full turn: no mesh resolves a thinner slit
+_ROUNDING = 1e-9  # rad
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,13 +48,13 @@ class CylinderSegmentMagnet(SingleMagnet):
         for key in ("start_angle", "end_angle"):
             check_number(self.words, f"dimensions.{key}", getattr(self, key))
         key, angle = "dimensions.end_angle", self.end_angle - self.start_angle
-        if angle >= 2 * pi * (1 - 1e-9):
+        if angle > 2 * pi - SMALLEST_ANGLE + _ROUNDING:
             raise InvalidValue(
-                f"{self.words}: end_angle must exceed start_angle by less than a full turn, which is a ring or "
-                f"cylinder magnet, got {format_quantity(angle, 'angle')} between them",
+                f"{self.words}: end_angle must exceed start_angle by at most 359°, less than a full turn, which is a "
+                f"ring or cylinder magnet, got {format_quantity(angle, 'angle')} between them",
                 key,
             )
-        if angle < SMALLEST_ANGLE:
+        if angle < SMALLEST_ANGLE - _ROUNDING:
             raise InvalidValue(
                 f"{self.words}: end_angle must exceed start_angle by at least 1°, got "
                 f"{format_quantity(angle, 'angle')} between them",
@@ -78,6 +79,12 @@ class CylinderSegmentMagnet(SingleMagnet):
             if key in table:
                 raise table.error("state angle, which is centred on +x, or start_angle and end_angle, not both", key)
         angle = table.quantity("angle", "angle")
+        if not SMALLEST_ANGLE - _ROUNDING <= angle <= 2 * pi - SMALLEST_ANGLE + _ROUNDING:
+            raise table.error(
+                "angle must lie between 1° and 359°; a full turn is a ring or cylinder magnet, "
+                f"got {format_quantity(angle, 'angle')}",
+                "angle",
+            )
         return values | {"start_angle": -angle / 2, "end_angle": angle / 2}
 
     def dimensions_table(self) -> dict[str, Any]:

@@ -26,13 +26,15 @@ from magfem.geometry.ring_magnet import RingMagnet
 from magfem.geometry.single_magnet import SingleMagnet
 from magfem.geometry.sphere_magnet import SphereMagnet
 from magfem.geometry.vectors import Vector, is_triple, three_angles, three_lengths, three_numbers, triple
-from magfem.units import describe, quoted
+from magfem.units import describe, format_quantity, quoted
 
 KINDS: dict[str, type[SingleMagnet]] = {
     kind.kind: kind
     for kind in (RingMagnet, CylinderMagnet, DiscMagnet, BlockMagnet, SphereMagnet, CylinderSegmentMagnet)
 }
 """What an assembly may hold."""
+
+_FARTHEST = 1e6  # largest dimensions from the origin, at which 1e-10 of them is left to rounding
 
 
 @dataclass(frozen=True)
@@ -72,6 +74,14 @@ class MagnetAssembly(MagneticSolids):
         largest = float(np.ptp(corners, axis=0).max())
         for k, part in enumerate(self.parts):
             check_thickness(self.words, f"magnets[{k}]", part.name, part.shape.thickness, largest)
+        for k, one in enumerate(self.magnets):
+            if max(map(abs, one.position)) > _FARTHEST * largest:
+                raise InvalidValue(
+                    f"{self.words}: position of {quoted(one.name)} must lie within "
+                    f"{format_quantity(_FARTHEST * largest, 'length')} of the origin, a million times the assembly's "
+                    f"size, or rounding spoils its shape, got {format_quantity(max(one.position, key=abs), 'length')}",
+                    f"magnets[{k}].position",
+                )
         if pair := overlapping(self.parts):
             raise InvalidValue(
                 f"{self.words}: {quoted(pair[0])} and {quoted(pair[1])} overlap; magnets may touch only", "magnets"

@@ -278,7 +278,13 @@ BARE = 'remanence = "1.2 T"'
         (card("block_magnet", 'size = ["5 mm", "5 mm", "2 um"]'), "at least 1/1000 of the largest", "dimensions.size"),
         (card("sphere_magnet", 'diameter = "0 mm"'), "diameter must be positive", "dimensions.diameter"),
         (card("disc_magnet", 'diameter = "8 mm"\nlength = "2 mm"'), 'unknown key "length"', "dimensions.length"),
-        (card("cylinder_segment_magnet", RING + 'angle = "360 deg"'), "less than a full turn", "dimensions.end_angle"),
+        (card("cylinder_segment_magnet", RING + 'angle = "360 deg"'), "between 1° and 359°", "dimensions.angle"),
+        (card("cylinder_segment_magnet", RING + 'angle = "0.5 deg"'), "between 1° and 359°", "dimensions.angle"),
+        (
+            card("cylinder_segment_magnet", RING + 'start_angle = "0 deg"\nend_angle = "359.9 deg"'),
+            "less than a full turn",
+            "dimensions.end_angle",
+        ),
         (
             card("cylinder_segment_magnet", RING + 'angle = "30 deg"\nend_angle = "2 deg"'),
             "state angle, which is centred on +x, or start_angle and end_angle, not both",
@@ -376,6 +382,13 @@ def test_bad_assemblies_name_file_and_key(rest: str, message: str, key: str) -> 
         geometry_from_text(TWO.format(rest), "c.toml")
     said = str(raised.value)
     assert message in said and said.endswith(f"[c.toml: {key}]") and len(said.splitlines()) == 1
+
+
+def test_assemblies_beyond_rounding_are_refused() -> None:
+    block = BlockMagnet(size=(2e-3, 2e-3, 2e-3), material=N48)
+    assert MagnetAssembly(magnets=(PlacedMagnet(block, (1e3, 0, 0)),)).volume == pytest.approx(8e-9)
+    with pytest.raises(InputError, match='position of "magnet_1" must lie within 2 km of the origin'):
+        MagnetAssembly(magnets=(PlacedMagnet(block, (0, -1e6, 0)),))
 
 
 def test_magnets_may_touch() -> None:
