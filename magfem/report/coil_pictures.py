@@ -38,9 +38,9 @@ def draw(solution: CoilSolution, place: Workplace) -> dict[str, tuple[Picture, .
     curves = [(words, field, direction(field, place.centre)) for field, words in _fields(solution)]
     found["lines"] = tuple(line_figure(curves, line, f"through the point {place.words}") for line in place.lines)
     log.info("report: homogeneity")
-    field: Field = solution if len(solution.circuits) == 1 else solution.circuits[0]
+    field, whose = _fields(solution)[0]
     level = [plane for plane in place.planes if _holds(plane, place)]
-    found["homogeneity"] = tuple(homogeneity_figure(field, place.centre, plane, outlines) for plane in level)
+    found["homogeneity"] = tuple(homogeneity_figure(field, place.centre, plane, outlines, whose) for plane in level)
     maps: list[Picture] = []
     for circuit, solved in list(zip(geometry.circuits, solution.circuits, strict=True))[: _densities(solution)]:
         density = density_map(circuit, solved.currents.sheets)

@@ -192,7 +192,7 @@ def test_strips_of_a_track_are_its_turns_and_its_leads() -> None:
         for lead in (False, True)
     }
     assert length[False] == pytest.approx(0.527816, rel=1e-4)
-    assert length[True] == pytest.approx(5.33262e-3, rel=1e-2)
+    assert length[True] == pytest.approx(track.lead_length, rel=1e-2)
 
 
 def test_workplaces_keep_off_the_metal() -> None:

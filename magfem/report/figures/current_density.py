@@ -80,7 +80,7 @@ def density_figures(found: DensityMap, name: str) -> tuple[Picture, Picture]:
             near,
             (worst[0] - close, worst[0] + close),
             (worst[1] - close, worst[1] + close),
-            f"The same around its largest value, {density.max():.3g} A/mm².",
+            "The same around its largest value; colours stop at twice the usual density.",
         ),
     ):
         with drawing():

@@ -18,8 +18,10 @@ _LEVELS = (0.0, 0.001, 0.01, 0.05, 0.1, 0.2, 0.5)
 _COLOURS = ("#0b4f7d", "#2b7bb0", "#6aaed6", "#b5d4e9", "#dfecf6", "#f3f7fb")
 
 
-def homogeneity_figure(field: Field, centre: Points, plane: Plane, surfaces: tuple[Surface, ...]) -> Picture:
-    """|B − B(centre)| / |B(centre)| in steps."""
+def homogeneity_figure(
+    field: Field, centre: Points, plane: Plane, surfaces: tuple[Surface, ...], whose: str = ""
+) -> Picture:
+    """|B − B(centre)| / |B(centre)| in steps; `whose` names the field where there are several."""
     side, points = plane.points(_MAP)
     found = deviation(field.B(points), field.B(centre))
     with drawing():
@@ -43,9 +45,10 @@ def homogeneity_figure(field: Field, centre: Points, plane: Plane, surfaces: tup
         bar.set_ticks(_LEVELS, labels=[f"{100 * level:g} %" for level in _LEVELS])
         axes.set_title("deviation from the centre", loc="left")
         content = png(drawn)
+    of = f" of {whose}" if whose else ""
     return Picture(
         f"homogeneity_{plane.horizontal}{plane.vertical}",
         content,
-        f"Map of the deviation of B from that at the centre, in the {plane.words}.",
-        f"Deviation of B from that at the centre (+), in the {plane.words}; the dark line is 1 %.",
+        f"Map of the deviation of B{of} from that at the centre, in the {plane.words}.",
+        f"Deviation of B{of} from that at the centre (+), in the {plane.words}; the dark line is 1 %.",
     )
