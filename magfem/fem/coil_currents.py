@@ -19,6 +19,7 @@ from magfem.fields.thick_solenoid import thick_solenoid_jet, thick_solenoid_vect
 from magfem.typing import Floats, Jet, Points
 
 _AROUND = 12  # places on a circle that stand for a turn, when what links it is not coaxial
+_FEW = 1000  # patches
 _GAUSS = 12  # places along each side of a winding's section
 
 
@@ -31,6 +32,7 @@ class CoilCurrents:
     filaments: centrelines of tracks.
     offset: (f, 3) m, from a filament to a place whose distance is the mean (geometric) one within its section.
     windings: (w, 6), inner radius, outer radius, length, centre on z (m), ampere-turns, radius of the wire (m).
+    excess: H, what sheets without thickness store more than the metal that they stand for.
     """
 
     sheets: SheetCurrents = field(default_factory=SheetCurrents.none)
@@ -39,6 +41,7 @@ class CoilCurrents:
     filaments: Filaments = field(default_factory=Filaments.none)
     offset: Floats = field(default_factory=lambda: np.empty((0, 3)))
     windings: Floats = field(default_factory=lambda: np.empty((0, 6)))
+    excess: float = 0.0
 
     @classmethod
     def joined(cls, parts: Sequence[CoilCurrents]) -> CoilCurrents:
@@ -55,6 +58,7 @@ class CoilCurrents:
             ),
             offset=np.concatenate([part.offset for part in parts]),
             windings=np.concatenate([part.windings for part in parts]),
+            excess=sum(part.excess for part in parts),
         )
 
     @property
@@ -87,7 +91,8 @@ class CoilCurrents:
 
     def elements(self) -> tuple[Floats, Floats]:
         """Current elements that integrate smooth fields over the metal: places (e, 3) m, strengths (e, 3) A·m."""
-        parts = [_flat(self.within.elements())] if self.within.count else []
+        rule = (6, 6) if self.within.count < _FEW else (2, 3)  # few patches are large ones
+        parts = [_flat(self.within.elements(rule))] if self.within.count else []
         parts += [_winding_elements(winding) for winding in self.windings]
         if self.filaments.current.size:
             wire = self.filaments
@@ -99,7 +104,7 @@ class CoilCurrents:
     @property
     def moment(self) -> Floats:
         """Dipole moment (3,) A·m²/A."""
-        moment: Floats = self.within.moment + self.filaments.moment
+        moment: Floats = (self.sheets if self.sheets.count else self.within).moment + self.filaments.moment
         for inner, outer, _, _, turns, _ in self.windings:
             moment[2] += turns * np.pi * (outer**2 + outer * inner + inner**2) / 3
         return moment

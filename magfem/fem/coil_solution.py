@@ -251,6 +251,7 @@ def _arrays(currents: CoilCurrents) -> dict[str, Floats]:
         "current": currents.filaments.current,
         "offset": currents.offset,
         "windings": currents.windings,
+        "excess": np.array(currents.excess),
     }
 
 
@@ -262,4 +263,5 @@ def _currents(arrays: dict[str, Floats]) -> CoilCurrents:
         filaments=Filaments(arrays["start"], arrays["end"], arrays["current"]),
         offset=arrays["offset"],
         windings=arrays["windings"],
+        excess=float(arrays["excess"]),
     )

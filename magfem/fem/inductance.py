@@ -16,7 +16,7 @@ from magfem.fields.coaxial_inductance import CoaxialWinding, mutual_inductance, 
 from magfem.fields.field import Field
 from magfem.typing import Floats
 
-_CONE = np.polynomial.legendre.leggauss(16)
+_CONE = np.polynomial.legendre.leggauss(32)
 
 
 def inductance_matrix(circuits: Sequence[CoilCurrents]) -> Floats:
@@ -30,6 +30,7 @@ def inductance_matrix(circuits: Sequence[CoilCurrents]) -> Floats:
                 matrix[i, j] = _windings(source.windings, driven.windings)
             else:
                 matrix[i, j] = float((source.vector_potential(places) * strengths).sum())
+        matrix[j, j] -= driven.excess
     return 0.5 * (matrix + matrix.T)
 
 

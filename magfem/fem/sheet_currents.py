@@ -51,7 +51,8 @@ FIELD = Rules((3, 2), (5.5, 18.0), (6, 3), (1.75, 6.0))  # about 1e-6 of a patch
 POTENTIAL = Rules((3, 2), (5.5, 18.0), (6, 3), (1.0, 3.0))  # the same, of the smoother 1/r
 FACES = Rules((4, 3), (6.6, 15.8), (8, 5), (1.7, 3.9))  # about 1e-9, for faces of foil that nearly cancel each other
 
-_DEEPEST = 56  # halvings, of both directions together: a point on the sheet gets the mean of both sides
+_DEEPEST = 40  # halvings, of both directions together, after which a point counts as lying on the sheet
+_STEP = 2e-4  # off the sheet for such a point, over the patch's smaller half-extent: it gets the mean of both sides
 _DEEPEST_LAYER = 18  # the same for 1/r, whose integral over what is left then is below 1e-7 of a patch's
 
 
@@ -87,9 +88,9 @@ class SheetCurrents:
         """(B, gradient[, hessian]) at `points` (n, 3) m: ∫ K × r/r³ times µ0/4π."""
         return self._integrals(points, order, layer=False, rules=FIELD)
 
-    def layer_jet(self, points: Points, order: int, rules: Rules = POTENTIAL) -> Jet:
+    def layer_jet(self, points: Points, order: int, rules: Rules | None = None) -> Jet:
         """(A, gradient[, hessian]) at `points` (n, 3) m: ∫ K/r times µ0/4π, the vector potential in T·m."""
-        return self._integrals(points, order, layer=True, rules=rules)
+        return self._integrals(points, order, layer=True, rules=rules or (POTENTIAL if order == 0 else FIELD))
 
     def vector_potential(self, points: Points) -> Floats:
         """A (n, 3) T·m in the Coulomb gauge."""
@@ -214,8 +215,9 @@ def _evaluate(
         far2[p] = (max(limits[0] * reach_u, limits[1] * reach_v) + radius) ** 2
         near2[p] = (max(limits[2] * reach_u, limits[3] * reach_v) + radius) ** 2
     stack = np.empty((_DEEPEST + 2, 5))
-    work = np.empty((5, 3))
+    work = np.empty((6, 3))
     leaf = np.empty((6, near.shape[2]))
+    own = np.empty(3), np.empty((3, 3)), np.empty((3, 3, 3))
     b = np.empty(3)
     g = np.zeros((3, 3))
     h = np.zeros((3, 3, 3))
@@ -238,7 +240,7 @@ def _evaluate(
             if dx * dx + dy * dy + dz * dz > near2[p]:
                 _add_points(x, y, z, near[p], order, layer, b, g, h)
             else:
-                _add_close(x, y, z, nodes[p], stream[p], rule, limits, order, layer, stack, work, leaf, b, g, h)
+                _add_close(x, y, z, nodes[p], stream[p], rule, limits, order, layer, stack, work, leaf, own, b, g, h)
         for j in range(3):
             value[i, j] = MU_0 / (4.0 * np.pi) * b[j]
             if order > 0:
@@ -266,8 +268,6 @@ def _add_points(
     if order > 1:
         for q in range(near.shape[1]):
             rx, ry, rz = x - near[0, q], y - near[1, q], z - near[2, q]
-            if rx * rx + ry * ry + rz * rz == 0.0:
-                continue  # the point itself: its two sides cancel
             if layer:
                 add_layer(rx, ry, rz, near[3, q], near[4, q], near[5, q], order, b, g, h)
             else:
@@ -292,15 +292,77 @@ def _add_close(
     stack: Floats,
     work: Floats,
     leaf: Floats,
+    own: tuple[Floats, Floats, Floats],
     b: Floats,
     g: Floats,
     h: Floats,
 ) -> None:
-    """One patch close to the point: halve it until every part is far enough for the near rule."""
-    middle, west, east, south, north = work[0], work[1], work[2], work[3], work[4]
+    """One patch close to the point; when the point lies on it, the mean of both sides."""
+    touches = _sum_close(x, y, z, nodes, stream, rule, limits, order, layer, stack, work, leaf, own)
+    if not touches:
+        _add_own(1.0, own, order, b, g, h)
+        return
+    # Integrals of 1/r² over the last piece would depend on its shape: step off the sheet along its normal.
+    step = work[5]
+    for side in (-1.0, 1.0):
+        _sum_close(
+            x + side * step[0],
+            y + side * step[1],
+            z + side * step[2],
+            nodes,
+            stream,
+            rule,
+            limits,
+            order,
+            layer,
+            stack,
+            work,
+            leaf,
+            own,
+        )
+        _add_own(0.5, own, order, b, g, h)
+
+
+@kernel
+def _add_own(factor: float, own: tuple[Floats, Floats, Floats], order: int, b: Floats, g: Floats, h: Floats) -> None:
+    """Add `factor` times one patch's sums."""
+    b += factor * own[0]
+    if order > 0:
+        g += factor * own[1]
+    if order > 1:
+        h += factor * own[2]
+
+
+@kernel
+def _sum_close(
+    x: float,
+    y: float,
+    z: float,
+    nodes: Floats,
+    stream: Floats,
+    rule: tuple[Floats, Floats, Floats, Floats],
+    limits: Floats,
+    order: int,
+    layer: bool,
+    stack: Floats,
+    work: Floats,
+    leaf: Floats,
+    own: tuple[Floats, Floats, Floats],
+) -> bool:
+    """Halve one patch until every part is far enough for the near rule; its sums are put into `own`.
+
+    True when the point lies on the patch, so that sums other than those of 1/r are worth nothing; `work[5]` is then a
+    small step along the normal.
+    """
+    middle, west, east, south, north, step = work[0], work[1], work[2], work[3], work[4], work[5]
+    b, g, h = own
+    b[:] = 0.0
+    g[:] = 0.0
+    h[:] = 0.0
     stack[0, :] = (0.0, 1.0, 0.0, 1.0, 0.0)
     height = 1
-    deepest = _DEEPEST_LAYER if layer and order == 0 else _DEEPEST
+    smooth = layer and order == 0
+    deepest = _DEEPEST_LAYER if smooth else _DEEPEST
     while height > 0:
         height -= 1
         u0, u1, v0, v1 = stack[height, 0], stack[height, 1], stack[height, 2], stack[height, 3]
@@ -327,17 +389,26 @@ def _add_close(
             r = (x if i == 0 else y if i == 1 else z) - middle[i]
             d2 += (r - s * a - t * c) ** 2
         need_u, need_v = limits[2] ** 2 * aa, limits[3] ** 2 * bb
-        if d2 < max(need_u, need_v) and depth < deepest:
-            if need_u >= need_v:
-                stack[height, :] = (u0, um, v0, v1, depth + 1)
-                stack[height + 1, :] = (um, u1, v0, v1, depth + 1)
-            else:
-                stack[height, :] = (u0, u1, v0, vm, depth + 1)
-                stack[height + 1, :] = (u0, u1, vm, v1, depth + 1)
-            height += 2
-            continue
+        if d2 < max(need_u, need_v):
+            if depth < deepest:
+                if need_u >= need_v:
+                    stack[height, :] = (u0, um, v0, v1, depth + 1)
+                    stack[height + 1, :] = (um, u1, v0, v1, depth + 1)
+                else:
+                    stack[height, :] = (u0, u1, v0, vm, depth + 1)
+                    stack[height + 1, :] = (u0, u1, vm, v1, depth + 1)
+                height += 2
+                continue
+            if not smooth:
+                for i in range(3):
+                    j, k = (i + 1) % 3, (i + 2) % 3
+                    step[i] = (east[j] - west[j]) * (north[k] - south[k]) - (east[k] - west[k]) * (north[j] - south[j])
+                size = _STEP * np.sqrt(min(aa / (u1 - u0) ** 2, bb / (v1 - v0) ** 2))
+                step *= size / np.sqrt((step**2).sum())
+                return True
         _fill_leaf(u0, u1, v0, v1, nodes, stream, rule, leaf)
         _add_points(x, y, z, leaf, order, layer, b, g, h)
+    return False
 
 
 @kernel

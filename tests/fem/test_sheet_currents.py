@@ -135,7 +135,6 @@ def test_on_the_sheet_tangential_b_is_the_mean_of_both_sides():
     )  # a millionth of each wall
 
 
-@pytest.mark.xfail(strict=True, reason="what is left of a patch about the point is not symmetric about it")
 def test_on_the_sheet_normal_b_is_the_mean_of_both_sides():
     on, mean = on_a_wall()
     np.testing.assert_allclose(box().jet(on, 0)[0][:, 0], mean[:, 0], rtol=0, atol=1e-6 * MU_0 * M)
