@@ -3,6 +3,10 @@
 H = −∇φ and B = µ₀ µ H + B_r with the recoil permeability µ (relative) and remanence B_r; div B = 0 in weak form:
 
     ∫ µ ∇φ·∇ψ dV + boundary(φ, ψ) = ∫ (B_r/µ₀)·∇ψ dV.
+
+The bodies' bound currents, from which the field is integrated, need φ on the surfaces only. There it is computed
+once more, from its own sources: along rims the elements' φ is least accurate, and what is left of it decides where
+the fields of several bodies nearly cancel.
 """
 
 from __future__ import annotations
@@ -15,6 +19,7 @@ from magfem.fem.linear_solver import solve_open, two_level
 from magfem.fem.open_boundary import sphere
 from magfem.fem.stiffness import assemble
 from magfem.fem.surface_currents import SurfaceCurrents
+from magfem.fem.surface_potential import surface_potential
 from magfem.mesh.mesh import Mesh
 from magfem.mesh.shape_functions import shape_gradients
 from magfem.typing import Floats
@@ -59,7 +64,9 @@ def _currents(mesh: Mesh, potential: Floats, permeability: Floats, magnetisation
     facets = [mesh.body_facets(index)[0] for index in range(len(mesh.names))]
     owner = np.repeat(np.arange(len(facets)), [len(f) for f in facets])
     nodes = np.concatenate(facets)
-    return SurfaceCurrents(mesh.points[nodes], potential[nodes], magnetisation[owner], permeability[owner] - 1.0)
+    M, chi = magnetisation[owner], permeability[owner] - 1.0
+    found = surface_potential(mesh.points, nodes, potential, M, chi)
+    return SurfaceCurrents(mesh.points[nodes], found[nodes], M, chi)
 
 
 def _flux_density(mesh: Mesh, potential: Floats, mu: Floats, m: Floats) -> Floats:
