@@ -17,7 +17,7 @@ from magfem.geometry.card import Table
 from magfem.geometry.circuit import Circuit, FoilTrack, Stations
 from magfem.geometry.conductor import Conductor
 from magfem.geometry.device import Device, header_from_card, length_text, two_digits
-from magfem.geometry.foil_ribbon import Piece, Placed, Ribbon
+from magfem.geometry.foil_ribbon import Curved, Piece, Placed, Ribbon
 from magfem.geometry.leads import Leads
 from magfem.geometry.limits import InvalidValue, check_length, check_number, check_thickness
 from magfem.geometry.rolled import WIDEST, RolledRibbon
@@ -173,6 +173,7 @@ class FoilCoil(Device):
         width, length = self.track_width, self.winding.length
         spacing = self.spacing or 0.0
         lead_length = self._lead_length
+        curvature = 0.0 if self.rolled_radius is None else 1.0 / self.rolled_radius
         tracks = []
         for layer in range(self.layers):
             height = (layer - 0.5 * (self.layers - 1)) * spacing
@@ -183,7 +184,7 @@ class FoilCoil(Device):
                 ribbon = Placed(ribbon, (0.0, 0.0, height))
             if angle:
                 ribbon = Placed(ribbon, angle=angle)
-            tracks.append(FoilTrack(ribbon, width, self.thickness, length, width * length, lead_length))
+            tracks.append(FoilTrack(ribbon, width, self.thickness, length, width * length, lead_length, curvature))
         return tuple(tracks)
 
     @property
@@ -226,10 +227,7 @@ class FoilCoil(Device):
         leads = [piece for piece in self._closed if piece.lead]
         if self.rolled_radius is None:
             return sum(piece.length for piece in leads)
-        legs = np.array([piece.ends[1].place - piece.ends[0].place for piece in leads])
-        level = np.array([piece.ends[0].place[2] for piece in leads])
-        legs[:, 0] *= 1 + level / self.rolled_radius
-        return float(np.linalg.norm(legs, axis=1).sum())
+        return sum(_rolled_length(piece, self.rolled_radius) for piece in leads)
 
     @property
     def _depth(self) -> float:
@@ -295,6 +293,18 @@ class FoilCoil(Device):
                 f"({format_quantity(inside, 'length')}), got {format_quantity(self.rolled_radius, 'length')}",
                 "rolled.radius",
             )
+
+
+def _rolled_length(piece: Piece, radius: float) -> float:
+    """Of a level piece or a via after rolling to `radius` (m), m."""
+    first, last = piece.ends
+    around = 1 + 0.5 * (first.place[2] + last.place[2]) / radius
+    if not isinstance(piece, Curved):
+        return float(np.linalg.norm((last.place - first.place) * [around, 1, 1]))
+    nodes, weights = np.polynomial.legendre.leggauss(16)
+    half = 0.5 * (piece.span[1] - piece.span[0])
+    slopes = piece.path(piece.span[0] + half * (1 + nodes))[1] * [around, 1]
+    return float(half * np.linalg.norm(slopes, axis=1) @ weights)
 
 
 def _radius_from_card(rolled: Table) -> float:

@@ -25,6 +25,7 @@ LONGEST = 12.0  # widths, an element at resolution 1
 FINEST = 0.05  # widths, the element next to a corner at resolution 1; the next ones double
 _UPRIGHT = 1.25  # widths from a corner, over which stations turn from the mitre to square
 _BESIDE = 0.1  # radii of a bend, the element of a straight piece next to it; the next ones double
+_EVENLY = 1.4  # the same of a curved piece, whose elements are of one size where it bends as much as its neighbour
 _NEARBY = 17  # samples of a curve
 _SHARP = np.cos(np.radians(2.0))  # bends by less crowd no current
 AGREEMENT = 1e-4  # of the meshed area and length with their closed forms
@@ -125,7 +126,7 @@ Path = Callable[[Floats], tuple[Floats, Floats]]
 
 @dataclass(frozen=True, eq=False)
 class Curved:
-    """A strip along a smooth curve in the plane z = 0, joined to others without corners.
+    """A strip along a smooth curve in the plane z = `level` (m), joined to others without corners.
 
     span: the parameter at either end.  samples: steps of the parameter, some 64 from one bend to the next.
     """
@@ -136,6 +137,7 @@ class Curved:
     length: float
     samples: int
     lead: bool = False
+    level: float = 0.0
 
     @property
     def ends(self) -> tuple[Frame, Frame]:
@@ -150,7 +152,7 @@ class Curved:
         return first, last
 
     def rows(self, resolution: float, joints: tuple[Joint, Joint], bend: float) -> tuple[Floats, Floats, Floats]:
-        places, across = self._frames(self._parameters(resolution, bend))[::2]
+        places, across = self._frames(self._parameters(resolution, joints, bend))[::2]
         return places, 0.5 * self.width * across, _normals(places.shape, joints)
 
     def _frames(self, parameters: Floats) -> tuple[Floats, Floats, Floats]:
@@ -159,9 +161,10 @@ class Curved:
         along = slopes / np.linalg.norm(slopes, axis=1)[:, None]
         across = np.stack([-along[:, 1], along[:, 0]], axis=1)
         spatial = [np.pad(vectors, ((0, 0), (0, 1))) for vectors in (places, along, across)]
+        spatial[0][:, 2] = self.level
         return spatial[0], spatial[1], spatial[2]
 
-    def _parameters(self, resolution: float, bend: float) -> Floats:
+    def _parameters(self, resolution: float, joints: tuple[Joint, Joint], bend: float) -> Floats:
         """The parameters (2n+1,) of the stations."""
         from scipy.interpolate import PchipInterpolator
         from scipy.ndimage import maximum_filter1d, uniform_filter1d
@@ -174,12 +177,35 @@ class Curved:
         bending = uniform_filter1d(maximum_filter1d(bending, _NEARBY), _NEARBY)
         density = np.maximum(bending / TURNING, speed / (LONGEST * self.width))
         density = np.maximum(density, np.abs(slopes[:, 0]) / (bend * TURNING))
+        even = len(t)
+        t, density = self._graded(t, density, speed, (joints[0].finest, joints[1].finest))
         elements = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(t))])
         count = ceil(max(1, ceil(elements[-1] - 1e-6)) * resolution - 1e-6)
         wanted = np.linspace(0.0, elements[-1], 2 * count + 1)
         parameters: Floats = PchipInterpolator(elements, t)(wanted)
         parameters[[0, -1]] = self.span
+        if len(t) > even:  # a parabola is the nearer to an arc, the nearer its middle to the arc's
+            parameters[1::2] = 0.5 * (parameters[:-1:2] + parameters[2::2])
         return parameters
+
+    def _graded(self, t: Floats, density: Floats, speed: Floats, finest: tuple[float, float]) -> tuple[Floats, Floats]:
+        """Parameters and elements per parameter, more of both where elements next to an end are to be smaller.
+
+        finest: m, at the ends; sizes grow with the distance from there.
+        """
+        sizes = [_EVENLY * size for size in finest]
+        steps = np.geomspace(1e-3, 1.0, 40) * (t[-1] - t[0])
+        wanted = [bool(density[end] * size < speed[end]) for end, size in zip((0, -1), sizes, strict=True)]
+        if not any(wanted):
+            return t, density
+        finer = np.concatenate([t, *([t[0] + steps] if wanted[0] else []), *([t[-1] - steps] if wanted[1] else [])])
+        finer = np.unique(finer.clip(t[0], t[-1]))
+        density, speed = np.interp(finer, t, density), np.interp(finer, t, speed)
+        for end, size, needed in zip((0, -1), sizes, wanted, strict=True):
+            if needed:
+                distance = speed[end] * np.abs(finer - finer[end])
+                density = np.maximum(density, speed / (size + distance))
+        return finer, density
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,13 +221,28 @@ class Ribbon:
             _joint(before.ends[1], after.ends[0])
             for before, after in zip((self.pieces[-1], *self.pieces[:-1]), self.pieces, strict=True)
         ]
-        return self._stations(resolution, [*joints, joints[0]])
+        return self._stations(resolution, self._smoothed([*joints, joints[0]]))
 
     def open(self, resolution: float) -> Stations:
         """The stations of pieces whose ends do not meet, cut off square there."""
         first, last = self.pieces[0].ends[0], self.pieces[-1].ends[1]
         joints = [_joint(before.ends[1], after.ends[0]) for before, after in pairwise(self.pieces)]
-        return self._stations(resolution, [_joint(first, first), *joints, _joint(last, last)])
+        return self._stations(resolution, self._smoothed([_joint(first, first), *joints, _joint(last, last)]))
+
+    def _smoothed(self, joints: list[Joint]) -> list[Joint]:
+        """Joints, their elements no larger than what a corner or bend beyond a short piece asks for.
+
+        Uneven current goes through folds unhindered, and a via is too short for it to settle.
+        """
+        finest = [joint.finest for joint in joints]
+        lengths = [piece.length for piece in self.pieces]
+        for _ in range(2):  # twice for what comes round the seam of a closed ribbon
+            finest[0] = finest[-1] = min(finest[0], finest[-1])
+            for i, length in enumerate(lengths):
+                finest[i + 1] = min(finest[i + 1], finest[i] + length)
+            for i, length in reversed(list(enumerate(lengths))):
+                finest[i] = min(finest[i], finest[i + 1] + length)
+        return [joint._replace(finest=size) for joint, size in zip(joints, finest, strict=True)]
 
     def _stations(self, resolution: float, joints: list[Joint]) -> Stations:
         found: list[tuple[Floats, Floats, Floats]] = []

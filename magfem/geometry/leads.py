@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise, product
-from math import tan
+from itertools import product
 from typing import Any
 
 import numpy as np
 
+from magfem.geometry.bounded_path import bounded_paths
 from magfem.geometry.card import Table
 from magfem.geometry.device import length_text
-from magfem.geometry.foil_ribbon import Frame, Straight
+from magfem.geometry.foil_ribbon import Curved, Frame, Piece, Straight
 from magfem.geometry.limits import InvalidValue, check_length, check_number
+from magfem.geometry.polyline_track import arc
 from magfem.typing import Floats
 from magfem.units import format_quantity
 
 BELOW = 50e-6  # m, from the turns' metal to the strip's middle where none is stated: a common foil
-_STEEPEST = 150.0  # degrees, a corner of the strip
+_RADII = (1.5, 1.25, 1.0, 0.75, 0.625)  # widths, of the strip's bends
+_WORTH = 4.0  # of length, that a gentler bend may cost for each width of radius
+_FORWARD = (0.0, 1.0, 2.0, 4.0)  # widths, from a via to the first bend
+_TAPER = 1.5  # widths, over which the strip gets its own
+_OFF = 0.1  # widths, between parts of the strip
+_SLIVER = 0.05  # widths, the shortest piece
 
 
 @dataclass(frozen=True)
@@ -64,36 +70,46 @@ class Leads:
         """The strip's depth (m) under turns of `thickness` (m)."""
         return thickness + BELOW if self.depth is None else self.depth
 
-    def strips(self, subject: str, end: Frame, start: Frame, depth: float) -> tuple[Straight, ...]:
+    def strips(self, subject: str, end: Frame, start: Frame, depth: float) -> tuple[Piece, ...]:
         """Via, return strip and via, from the `end` of the turns to their `start`. Raises InvalidValue."""
         down = np.array([0.0, 0.0, -depth])
         width = end.width if self.width is None else self.width
-        points = [np.append(point, -depth) for point in return_route(subject, end, start, max(width, end.width))]
-        widths = [end.width, *[width] * (len(points) - 2), start.width]
-        strips = [Straight(end.place, end.place + down, end.across, (end.width, end.width), lead=True)]
-        for (first, last), pair in zip(pairwise(points), pairwise(widths), strict=True):
-            along = (last - first) / np.linalg.norm(last - first)
-            strips.append(Straight(first, last, np.array([-along[1], along[0], 0.0]), pair, lead=True))
-        strips.append(Straight(start.place + down, start.place, start.across, (start.width, start.width), lead=True))
-        return tuple(strips)
+        return (
+            Straight(end.place, end.place + down, end.across, (end.width, end.width), lead=True),
+            *_return_strip(subject, end, start, width, -depth),
+            Straight(start.place + down, start.place, start.across, (start.width, start.width), lead=True),
+        )
 
 
-def return_route(subject: str, end: Frame, start: Frame, width: float) -> list[Floats]:
-    """The shortest polyline (n, 2) m in the plan that goes on from `end` and comes to `start` from behind.
+def _return_strip(subject: str, end: Frame, start: Frame, width: float, level: float) -> list[Piece]:
+    """The shortest way in the plane z = `level` (m) that goes on from `end` and comes to `start` from behind.
 
-    It has room for a strip of `width` (m) with mitred corners. Raises InvalidValue when there is none.
+    Bends are arcs: the current crowds in corners, and all the more the sharper they are. Next to a via the strip
+    widens or narrows to its `width` (m). Raises InvalidValue when it finds no way that keeps off itself.
     """
-    routes = []
-    for forward, aside in product((1.5, 2.5, 4.0, 6.0), (0.0, 2.0, 4.0, 8.0)):
-        for sides in product((-1, 0, 1), repeat=2) if aside else ((0, 0),):
-            points = [end.place[:2], end.place[:2] + forward * width * end.along[:2]]
-            points += [points[-1] + aside * width * sides[0] * end.across[:2]] if sides[0] else []
-            before = start.place[:2] - forward * width * start.along[:2]
-            points += [before + aside * width * sides[1] * start.across[:2]] if sides[1] else []
-            routes.append([*points, before, start.place[:2]])
-    for route in sorted(routes, key=lambda points: sum(np.linalg.norm(b - a) for a, b in pairwise(points))):
-        if _has_room(route, width):
-            return route
+    widest = max(width, end.width, start.width)
+    tapers = [_TAPER * widest if abs(width - frame.width) > 1e-9 * widest else 0.0 for frame in (end, start)]
+    found = []
+    for radius, forward in product(_RADII, _FORWARD):
+        first, last = (taper + forward * widest for taper in tapers)
+        departure, arrival = end.place[:2] + first * end.along[:2], start.place[:2] - last * start.along[:2]
+        for way in bounded_paths(departure, end.along[:2], arrival, start.along[:2], radius * widest):
+            length = first + last + sum(leg.length for leg in way)
+            found.append((length - _WORTH * radius * widest, radius * widest, departure, way, arrival))
+    for _, radius, departure, way, arrival in sorted(found, key=lambda each: each[0]):
+        pieces: list[Piece] = []
+        if (departure != end.place[:2]).any():
+            pieces.append(_strip(end.place[:2], departure, (end.width, width), level))
+        for place, along, turn, length in way:
+            across = np.array([-along[1], along[0]])
+            if turn:
+                pieces.append(arc(place, across, turn, radius, width, level=level, lead=True))
+            else:
+                pieces.append(_strip(place, place + length * along, (width, width), level))
+        if (arrival != start.place[:2]).any():
+            pieces.append(_strip(arrival, start.place[:2], (width, start.width), level))
+        if _has_room(pieces, widest):
+            return pieces
     raise InvalidValue(
         f"{subject}: a return strip {format_quantity(width, 'length')} wide finds no way from the end of the turns to "
         "their beginning",
@@ -101,23 +117,36 @@ def return_route(subject: str, end: Frame, start: Frame, width: float) -> list[F
     )
 
 
-def _has_room(points: list[Floats], width: float) -> bool:
-    """Whether mitres fit between the corners and no two parts of the strip touch."""
+def _strip(first: Floats, last: Floats, widths: tuple[float, float], level: float) -> Straight:
+    """A straight piece between two places (2,) m of the plan."""
+    along = (last - first) / np.linalg.norm(last - first)
+    return Straight(
+        np.append(first, level), np.append(last, level), np.array([-along[1], along[0], 0.0]), widths, lead=True
+    )
+
+
+def _has_room(pieces: list[Piece], width: float) -> bool:
+    """Whether a strip of `width` (m) nowhere touches itself or its vias, and no piece is a mere sliver.
+
+    Where it did, it would cover less than its length times its width.
+    """
     from shapely import LineString
 
-    legs = [b - a for a, b in pairwise(points)]
-    if any(np.linalg.norm(leg) < 0.5 * width for leg in legs):
+    if min(piece.length for piece in pieces) < _SLIVER * width:
         return False
-    angles = [np.arctan2(leg[1], leg[0]) for leg in legs]
-    turns = np.abs((np.diff(angles) + np.pi) % (2 * np.pi) - np.pi)
-    if turns.max(initial=0.0) > np.radians(_STEEPEST):
-        return False
-    mitres = [0.0, *(0.5 * width * tan(0.5 * turn) for turn in turns), 0.0]
-    for leg, (first, last) in zip(legs, pairwise(mitres), strict=True):
-        if np.linalg.norm(leg) < first + last + 0.25 * width:
-            return False
-    lines = [LineString(pair) for pair in pairwise(points)]
-    return all(first.distance(second) > 1.02 * width for i, first in enumerate(lines) for second in lines[i + 2 :])
+    begin, end = pieces[0].ends[0], pieces[-1].ends[1]
+    behind, beyond = begin.place - _OFF * width * begin.along, end.place + _OFF * width * end.along
+    line = LineString(np.concatenate([[behind], *(_places(piece) for piece in pieces), [beyond]])[:, :2])
+    room = (1 + _OFF) * width
+    return bool(line.buffer(0.5 * room, cap_style="flat").area > room * (line.length - _SLIVER * width))
+
+
+def _places(piece: Piece) -> Floats:
+    """Along the centreline, (n, 3) m."""
+    if not isinstance(piece, Curved):
+        return np.stack([frame.place for frame in piece.ends])
+    plan = piece.path(np.linspace(*piece.span, 65))[0]
+    return np.pad(plan, ((0, 0), (0, 1)), constant_values=piece.level)
 
 
 def _is_real(value: object) -> bool:

@@ -51,9 +51,9 @@ def polyline_track(points: Floats, width: float, radii: Floats | None = None) ->
             pieces.append(Straight(_lifted(start), _lifted(end), _lifted(across[i]), (width, width)))
             length += float(rest)
         if i + 1 < len(legs) and radii[i + 1] > 0:
-            arc = _arc(end, across[i], float(turns[i + 1]), float(radii[i + 1]), width)
-            pieces.append(arc)
-            length += arc.length
+            bend = arc(end, across[i], float(turns[i + 1]), float(radii[i + 1]), width)
+            pieces.append(bend)
+            length += bend.length
     return tuple(pieces), length
 
 
@@ -112,8 +112,13 @@ def corner_radii(points: Floats, sides: int, pitch: float, width: float, radius:
     return np.where(bends >= 0, convex, concave)
 
 
-def _arc(start: Floats, across: Floats, turn: float, radius: float, width: float) -> Curved:
-    """An arc from `start` that turns by `turn` (rad), leftwards when positive."""
+def arc(
+    start: Floats, across: Floats, turn: float, radius: float, width: float, *, level: float = 0.0, lead: bool = False
+) -> Curved:
+    """An arc from the plan's place `start` (2,) m that turns by `turn` (rad), leftwards when positive.
+
+    across: (2,), to its left at the start.  level: m, of its plane.
+    """
     side = 1.0 if turn > 0 else -1.0
     centre = start + side * radius * across
     begin = float(np.arctan2(*(start - centre)[::-1]))
@@ -122,7 +127,7 @@ def _arc(start: Floats, across: Floats, turn: float, radius: float, width: float
         c, s = np.cos(begin + side * angles), np.sin(begin + side * angles)
         return centre + radius * np.stack([c, s], axis=1), side * radius * np.stack([-s, c], axis=1)
 
-    return Curved(path, (0.0, abs(turn)), width, radius * abs(turn), 32)
+    return Curved(path, (0.0, abs(turn)), width, radius * abs(turn), 32, lead, level)
 
 
 def _lifted(plan: Floats) -> Floats:

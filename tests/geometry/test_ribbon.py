@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from shapely import Polygon, unary_union
 
 from magfem.errors import InputError, MeshError
 from magfem.geometry import FoilTrack, Stations, check_ribbon, load_geometry
@@ -130,10 +131,68 @@ def test_a_via_goes_straight_down_and_the_strip_forward_again() -> None:
     stations = tracks("planar_coil_12mm")[0].stations(1.0)
     first = int(np.flatnonzero(stations.lead)[0])
     middle = 0.5 * (stations.left + stations.right)
-    directions = unit(middle[2::2] - middle[:-2:2])
-    np.testing.assert_allclose(directions[first], [0, 0, -1], atol=1e-12)
-    assert directions[first - 1] @ directions[first + 1] == pytest.approx(1, abs=6e-3)  # a curved element is a chord
-    np.testing.assert_allclose(stations.normal[2 * first + 1], directions[first + 1], atol=1e-9)
+    directions = unit(-3 * middle[:-2:2] + 4 * middle[1::2] - middle[2::2])  # where elements begin
+    strip = first + int(np.argmax(np.abs(directions[first:, 2]) < 1e-9))
+    np.testing.assert_allclose(directions[first:strip], np.tile([0, 0, -1], (strip - first, 1)), atol=1e-9)
+    ending = unit(middle[2 * first - 2] - 4 * middle[2 * first - 1] + 3 * middle[2 * first])
+    assert ending @ directions[strip] == pytest.approx(1, abs=1e-4)  # parabolas, not the curves themselves
+    np.testing.assert_allclose(stations.normal[2 * first + 1], directions[strip], atol=2e-3)
+
+
+@pytest.mark.parametrize("name", CARDS)
+def test_return_strips_bend_gently(name: str) -> None:
+    """No two chords of a level strip turn by more than an arc's element does: nowhere a mitre."""
+    for track in tracks(name):
+        stations = track.stations(1.0)
+        middle = 0.5 * (stations.left + stations.right)
+        radius = np.hypot(middle[:, 0], middle[:, 1])
+        plan = middle[:, :2]
+        if name.startswith("stator_1.6"):  # unrolled
+            plan = np.stack([np.unwrap(np.arctan2(middle[:, 1], middle[:, 0])) * radius, middle[:, 2]], axis=1)
+        chords = np.diff(plan[::2], axis=0)
+        level = np.isclose(
+            np.linalg.norm(chords, axis=1), np.linalg.norm(np.diff(middle[::2], axis=0), axis=1), rtol=0.05
+        )
+        strip = np.flatnonzero(stations.lead & level)
+        assert (np.diff(strip) == 1).all()
+        along = unit(chords[strip])
+        turns = np.arccos(np.clip((along[1:] * along[:-1]).sum(axis=1), -1, 1))
+        assert np.degrees(turns.max()) < 9.0
+        bends = np.linalg.norm(chords[strip], axis=1)[1:-1] / np.maximum(turns[:-1], 1e-9)
+        assert bends.min() > 0.6 * track.width
+
+
+@pytest.mark.parametrize(("turns", "strands"), [(1, 2), (2, 3), (3, 4), (5, 5)])
+def test_return_strips_keep_off_themselves(turns: int, strands: int) -> None:
+    """By the area of the union of their elements."""
+    rectangle, meander = load_geometry("stator_inner_coil_flat"), load_geometry("meander_coil_10x5")
+    for coil in (replace(rectangle, turns=turns), replace(meander, strands=strands)):  # type: ignore[call-arg]
+        stations = coil.circuits[0].parts[0].stations(2.0)
+        low = np.flatnonzero(stations.lead & (np.abs(np.diff(stations.left[::2, 2])) < 1e-12))
+        quads = [
+            np.concatenate([stations.left[2 * n : 2 * n + 3], stations.right[2 * n : 2 * n + 3][::-1]]) for n in low
+        ]
+        shapes = [Polygon(quad[:, :2]) for quad in quads]
+        assert unary_union(shapes).area == pytest.approx(sum(shape.area for shape in shapes), rel=1e-6)
+
+
+def test_elements_next_to_a_via_follow_the_strips_bend_beyond_it() -> None:
+    """A via is much shorter than the track is wide: what is uneven in the strip is uneven in the turns."""
+    for name in FLAT_CARDS:
+        track = tracks(name)[0]
+        stations = track.stations(1.0)
+        middle = 0.5 * (stations.left + stations.right)
+        sizes = np.linalg.norm(np.diff(middle[::2], axis=0), axis=1)
+        turns = np.flatnonzero(~stations.lead)
+        assert sizes[turns[[0, -1]]].max() < 1.5 * track.width
+
+
+def test_curved_tracks_curve_on_the_cylinder() -> None:
+    assert [track.curvature for track in tracks("meander_coil_10x5")] == [0.0]
+    radii = load_geometry("stator_1.6x5.5").radii  # type: ignore[attr-defined]
+    assert [1 / track.curvature for track in tracks("stator_1.6x5.5")] == pytest.approx(
+        [radii["inner"], radii["outer"]]
+    )
 
 
 def test_parabolas_through_the_stations_follow_the_spiral() -> None:
