@@ -16,6 +16,8 @@ from magfem.geometry.limits import InvalidValue, check_length
 from magfem.geometry.wire import THINNEST
 from magfem.units import describe, format_quantity
 
+THICKEST = 0.2  # of the loop's diameter, as in `magfem.fields.coaxial_inductance`, a wire
+
 
 @dataclass(frozen=True, kw_only=True)
 class LoopCoil(Device):
@@ -42,6 +44,13 @@ class LoopCoil(Device):
         if self.wire_diameter >= self.diameter:
             size = format_quantity(self.diameter, "length")
             raise InvalidValue(f"{self.words}: wire_diameter must be smaller than diameter ({size}), got {wire}", key)
+        if self.wire_diameter > THICKEST * self.diameter:
+            most = format_quantity(THICKEST * self.diameter, "length")
+            raise InvalidValue(
+                f"{self.words}: wire_diameter must be at most {most}, {THICKEST:g} of the diameter, for the formula of "
+                f"its inductance to hold, got {wire}; a thicker turn is a solenoid",
+                key,
+            )
         if self.wire_diameter < THINNEST:
             least = format_quantity(THINNEST, "length")
             raise InvalidValue(f"{self.words}: wire_diameter must be at least {least}, got {wire}", key)

@@ -24,6 +24,7 @@ DIAMETRIC: Direction = (1.0, 0.0, 0.0)
 DIRECTIONS = {"axial": AXIAL, "diametric": DIAMETRIC}
 
 STRONGEST_REMANENCE = 2.0  # T; the best sintered NdFeB reaches 1.5 T
+WEAKEST_REMANENCE = 1e-6  # T; far below what a compass shows
 LARGEST_RECOIL_PERMEABILITY = 10.0  # alnico, the softest in use, has at most 7
 
 COLDEST, HOTTEST = 77.0, 800.0  # K; straight demagnetisation curves are known between these at best
@@ -55,6 +56,12 @@ class PermanentMagnet:
         if self.remanence <= 0:
             raise InvalidValue(
                 f"{_SUBJECT}: remanence must be positive, got {got}; its sign belongs to magnetisation",
+                "material.remanence",
+            )
+        if self.remanence < WEAKEST_REMANENCE:
+            raise InvalidValue(
+                f"{_SUBJECT}: remanence must be at least {format_quantity(WEAKEST_REMANENCE, 'flux density')}, "
+                f"got {got}",
                 "material.remanence",
             )
         if self.remanence > STRONGEST_REMANENCE:

@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from magfem.geometry.foil_coil import FoilCoil, Winding
-from magfem.geometry.limits import InvalidValue
+from magfem.geometry.limits import ROUNDING, InvalidValue
 from magfem.geometry.polyline_track import SHORTEST_STRAND, polyline_track
 from magfem.units import format_quantity
 
@@ -35,6 +35,13 @@ class MeanderCoil(FoilCoil):
         if self.strands < 2:
             raise InvalidValue(f"{self.words}: strands must be at least 2, got {self.strands:g}", "dimensions.strands")
         object.__setattr__(self, "strands", int(self.strands))
+        narrowest = SHORTEST_STRAND * self.strand_width
+        if self.gap < narrowest * (1 - ROUNDING):
+            raise InvalidValue(
+                f"{self.words}: gap must be at least {format_quantity(narrowest, 'length')} for the mitred corners "
+                f"between strands of this width, got {format_quantity(self.gap, 'length')}",
+                "dimensions.gap",
+            )
         shortest = (2 + SHORTEST_STRAND) * self.strand_width
         if self.length < shortest:
             raise InvalidValue(

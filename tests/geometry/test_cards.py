@@ -224,6 +224,12 @@ DIRECTION = "permanent magnet: magnetisation must be three numbers such as [0, 1
         ),
         (
             '"1.35 T"',
+            '"1e-300 T"',
+            "permanent magnet: remanence must be at least 1 µT, got 1e-291 nT",
+            "material.remanence",
+        ),
+        (
+            '"1.35 T"',
             '"13.5 T"',
             "permanent magnet: remanence must be at most 2 T, got 13.5 T; no permanent magnet has more",
             "material.remanence",

@@ -344,6 +344,7 @@ FAULTS = [
     ("saddle_coil", {"breadth": '"28 mm"'}, "", "dimensions.length", "must fit into"),
     ("saddle_coil", {"bend_radius": '"0 mm"'}, "", "dimensions.bend_radius", "positive"),
     ("loop_coil", {"wire_diameter": '"60 mm"'}, "", "dimensions.wire_diameter", "smaller than diameter"),
+    ("loop_coil", {"wire_diameter": '"10.1 mm"'}, "", "dimensions.wire_diameter", "at most 10 mm, 0.2 of the diameter"),
     ("loop_coil", {"wire_diameter": '"2 um"'}, "", "dimensions.wire_diameter", "at least 10 µm"),
     ("loop_coil", {"turns": "2"}, "", "dimensions.turns", "unknown key"),
 ]
