@@ -199,7 +199,9 @@ class Curved:
         if not any(wanted):
             return t, density
         finer = np.concatenate([t, *([t[0] + steps] if wanted[0] else []), *([t[-1] - steps] if wanted[1] else [])])
-        finer = np.unique(finer.clip(t[0], t[-1]))
+        apart = 1e-6 * (t[-1] - t[0])
+        finer = np.sort(finer[(finer > t[0] + apart) & (finer < t[-1] - apart)])
+        finer = np.concatenate([t[:1], finer[np.diff(finer, prepend=-inf) > apart], t[-1:]])
         density, speed = np.interp(finer, t, density), np.interp(finer, t, speed)
         for end, size, needed in zip((0, -1), sizes, wanted, strict=True):
             if needed:

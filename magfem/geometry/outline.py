@@ -30,7 +30,7 @@ from magfem.units import describe, format_quantity, quantity, quoted
 LEAST_GAP = 0.8  # of the stated gap, that a winding which fills its window may come down to
 _TIGHTEST = 0.6  # widths, the least radius of a bend of the centreline
 _FINE = 2.0  # the resolution at which gaps between curved tracks are measured
-_SHARPEST = 150.0  # degrees, the most that an outline may turn at a corner
+_SHARPEST = 120.0  # degrees, the most that an outline may turn at a corner
 _IN_LINE = 1e-6  # rad, the least
 _AS_STATED = 0.95  # of the stated gap, as measured between facets
 _MOST_POINTS = 1000
@@ -320,7 +320,7 @@ class Polygon:
         angles = np.arctan2(legs[:, 1], legs[:, 0])
         turns = np.abs((np.roll(angles, -1) - angles + np.pi) % (2 * np.pi) - np.pi)
         sharpest = int(np.argmax(turns))
-        if turns[sharpest] > np.radians(_SHARPEST):
+        if turns[sharpest] > np.radians(_SHARPEST) + _IN_LINE:
             x, y = (format_quantity(value, "length") for value in np.roll(corners, -1, axis=0)[sharpest])
             raise InvalidValue(
                 f"{subject}: the outline's corners must be at least {180 - _SHARPEST:g} deg wide, that at "
