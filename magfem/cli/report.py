@@ -17,9 +17,9 @@ def add(commands: CommandLine) -> None:
         run,
         "one HTML page: device, field, model, and how far to trust them",
         "Writes a page that opens without a network: the device, its field, its model and the errors of both. A\n"
-        "magnet's card is solved and fitted first; a coil's is solved, and its page holds resistance, inductance and the\n"
-        "field per ampere. A name is a report recipe if there is one, else a field model, else a\n"
-        "device card. --pdf prints the page beside it, which needs Chromium.",
+        "magnet's card is solved and fitted first; a coil's is solved, and its page holds resistance, inductance and\n"
+        "the field per ampere. A name is a report recipe if there is one, else a field model, else a device card.\n"
+        "--pdf prints the page beside it, which needs Chromium.",
         [
             "magfem report ring_magnet_4x1.5x1",
             "magfem report ring.json -o ring.html",
