@@ -25,6 +25,10 @@ def on_axis(z: float) -> float:
 
 RIGID, RIGID_SLOPE = on_axis(3.0), (on_axis(3.001) - on_axis(2.999)) / 2e-6
 
+# B_z (T) at 1 A of 24 loops that fill radii 1 to 6 mm, 1 mm above their middle.
+RADII = 1e-3 + 5e-3 * (np.arange(24) + 0.5) / 24
+LOOPS = float((2e-7 * np.pi * RADII**2 / (RADII**2 + 1e-6) ** 1.5).sum())
+
 # For every Python block of a page, in order: an expression, its value, and the relative tolerance.
 EXPECTED = {
     "tutorial.md": [
@@ -35,11 +39,21 @@ EXPECTED = {
         ("gradient[0, 2, 2]", 0.973 * RIGID_SLOPE, 5e-3),
         ("far[2] / (2e-7 * model.moment[2] / 0.1**3)", 1.0, 5e-3),  # a dipole, far away
         ("check.passed", True, 0),
+        ("2 * circuit.resistance_error < 1e-3 and coil.power([0.2]) / circuit.resistance", 0.04, 1e-9),
     ],
     "how-to.md": [
         ("disc.region.extent", 12e-3, 1e-9),
         ("ring.moment[2]", 0.0116016, 1e-4),
+        ("hot.material.working_remanence / hot.material.remanence", 1 - 0.0012 * 60, 1e-9),
         ("oblique.material.magnetisation[2]", 0.5**0.5, 1e-9),
+        ("half.B([0.0, 0.0, 1e-3])[2] / (0.5 * LOOPS)", 1.0, 5e-3),
+        ("drive.power / (0.02 * sum(circuit.resistance for circuit in stator.circuits))", 1.0, 1e-9),
+        (
+            "flux_linkage(loop, magfem.exact(small).at(place))[0] / (loop.B([0, 0, 10e-3])[2] * small.moment[2])",
+            1,
+            1e-3,
+        ),
+        ("second.inductance[0, 0] / 12.5936e-3", 1.0, 5e-3),  # H, by integration of A·J
         ("gradient.trace() / abs(gradient).max()", 0.0, 1e-12),
         ("B.shape[0] * B.shape[1]", 41 * 101, 0),
         ("ring_model.region.extent", 6e-3, 1e-9),
@@ -69,7 +83,7 @@ def test_python_blocks_give_the_numbers_they_promise(name, tmp_path, monkeypatch
     names: dict[str, object] = {}
     for number, (text, (expression, value, tolerance)) in enumerate(zip(code, EXPECTED[name], strict=True)):
         exec(compile(text, f"{name}, Python block {number + 1}", "exec"), names)
-        found = eval(expression, names)
+        found = eval(expression, names | {"LOOPS": LOOPS})
         assert found == pytest.approx(value, rel=tolerance, abs=tolerance if value == 0 else 0), (number, expression)
 
 
