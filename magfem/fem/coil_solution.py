@@ -21,6 +21,7 @@ from magfem.geometry import Coil, describe
 from magfem.mesh.coil_surfaces import coil_surfaces, quadrilaterals
 from magfem.mesh.export import write_cells
 from magfem.typing import ArrayLike, Floats, Jet, Points
+from magfem.units import describe as words
 from magfem.units import quoted
 
 FORMAT = "magfem-coil-solution"
@@ -210,6 +211,9 @@ class CoilSolution(Evaluated):
 
 def coil_solution(summary: dict[str, Any], arrays: dict[str, Any], geometry: Coil) -> CoilSolution:
     """From what `CoilSolution.save` wrote; KeyError, TypeError, ValueError … when it is not whole."""
+    for value in (summary["settings"]["resolution"], summary["error"]["B"], summary["error"]["gradient"]):
+        if type(value) not in (int, float):
+            raise ValueError(f"resolution and stated errors must be numbers, got {words(value)}")
     circuits = []
     for number, (name, known) in enumerate(summary["quantities"]["circuits"].items()):
         prefix = f"circuit{number}_"
@@ -234,7 +238,7 @@ def coil_solution(summary: dict[str, Any], arrays: dict[str, Any], geometry: Coi
         error=summary["error"],
         stats=summary["stats"],
         settings=summary["settings"],
-        stored_inductance=arrays["inductance"],
+        stored_inductance=_checked(arrays["inductance"], (len(circuits), len(circuits)), "inductance"),
     )
 
 
@@ -255,7 +259,37 @@ def _arrays(currents: CoilCurrents) -> dict[str, Floats]:
     }
 
 
+_SHAPES: dict[str, tuple[int | None, ...]] = {
+    "sheets_nodes": (None, 9, 3),
+    "sheets_stream": (None, 9),
+    "faces_nodes": (None, 9, 3),
+    "faces_stream": (None, 9),
+    "within_nodes": (None, 9, 3),
+    "within_stream": (None, 9),
+    "start": (None, 3),
+    "end": (None, 3),
+    "current": (None,),
+    "offset": (None, 3),
+    "windings": (None, 6),
+    "excess": (),
+}
+
+
+def _checked(array: Floats, shape: tuple[int | None, ...], name: str) -> Floats:
+    """An array of finite numbers of a shape (None: any count); ValueError for another."""
+    fits = array.ndim == len(shape) and all(n is None or n == m for n, m in zip(shape, array.shape, strict=True))
+    if array.dtype != float or not fits or not np.isfinite(array).all():
+        raise ValueError(f"{name} must be finite numbers of shape {shape}, got {array.dtype} of shape {array.shape}")
+    return array
+
+
 def _currents(arrays: dict[str, Floats]) -> CoilCurrents:
+    arrays = {name: _checked(arrays[name], shape, name) for name, shape in _SHAPES.items()}
+    for kind in ("sheets", "faces", "within"):
+        if len(arrays[f"{kind}_nodes"]) != len(arrays[f"{kind}_stream"]):
+            raise ValueError(f"{kind}_nodes and {kind}_stream must be of one length")
+    if len({len(arrays[name]) for name in ("start", "end", "current", "offset")}) > 1:
+        raise ValueError("start, end, current and offset must be of one length")
     return CoilCurrents(
         sheets=SheetCurrents(arrays["sheets_nodes"], arrays["sheets_stream"]),
         faces=SheetCurrents(arrays["faces_nodes"], arrays["faces_stream"]),

@@ -52,6 +52,10 @@ def choose_dimension(geometry: Geometry, dimension: int | None) -> int | None:
     if dimension == 2 and not geometry.axisymmetric:
         raise InputError("only bodies of revolution with axial magnetisation can be solved in dimension 2: use 3")
     if isinstance(geometry, Coil):
+        if dimension is not None:
+            raise InputError(
+                "dimension is a choice for magnets: a coil's current is solved where it flows, leave it out"
+            )
         return None
     if dimension is None:
         return 2 if geometry.axisymmetric else 3

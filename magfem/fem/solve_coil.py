@@ -62,6 +62,9 @@ def solve_coil(
     started = time.perf_counter()
     if conduction is not None and conduction not in ("filament", "sheet", "solid"):
         raise InputError(f'conduction must be "filament", "sheet" or "solid", got {describe(conduction)}')
+    parts = [part for circuit in geometry.circuits for part in circuit.parts]
+    if conduction is not None and not any(isinstance(part, FoilTrack) for part in parts):
+        raise InputError("conduction is a choice for coils of foil: in a winding the turns spread the current evenly")
     refined = refine(
         solve=lambda fineness: [
             _solve_circuit(circuit, geometry, fineness, conduction) for circuit in geometry.circuits

@@ -17,6 +17,7 @@ from magfem.geometry import Magnets
 from magfem.mesh.generate import generate
 from magfem.mesh.mesh import check_volumes
 from magfem.mesh.quality import quality
+from magfem.typing import Jet, Points
 
 log = logging.getLogger("magfem")
 
@@ -26,9 +27,10 @@ RESOLUTIONS = {2: (0.25, 8.0), 3: (0.5, 4.0)}
 _STATED = {2: 1.0, 3: 1.8}
 """Stated error over the difference between solutions on elements of full and of twice the size, by dimension.
 
-With errors that fall with order p the finer one's is the difference over 2^p − 1: all of it in 3D, where rims
-limit p to about 1, a third or less in 2D. What is more covers what the worst point does from one unstructured mesh
-to the next; docs/accuracy.md shows the ladder of resolutions that these factors are honest on.
+With errors that fall with order p the finer one's is the difference over 2^p − 1: all of it in 3D, where the limits on
+coarse elements leave p at about 1 below resolution 1, a third or less in 2D. What is more covers what the worst point
+does from one unstructured mesh to the next; docs/accuracy.md shows the ladder of resolutions that these factors are
+honest on.
 """
 _ROUNDING = 1e-11  # nothing is stated to be better than this
 
@@ -38,13 +40,17 @@ def solve_magnets(geometry: Magnets, dimension: int, resolution: float, toleranc
     started = time.perf_counter()
 
     def stated(difference: float, discrete: Discrete) -> float:
-        # The field is proportional to the magnet's volume, and tightly curved walls may be meshed alike in both
-        # solutions, so that twice the volume's error is added.
+        # The field is proportional to the magnet's volume, which no difference of `jet` shows: twice its error is added.
         return max(_STATED[dimension] * difference + 2 * _misshape(geometry, discrete), _ROUNDING)
+
+    def jet(discrete: Discrete, points: Points) -> Jet:
+        # As if the meshes had the bodies' volume: between two of them their shapes' errors come out at any ratio.
+        share = sum(body.volume for body in geometry.bodies) / discrete.volume.sum()
+        return tuple(values * share for values in discrete.currents.jet(points, 1))
 
     refined = refine(
         solve=lambda fineness: solve_once(geometry, dimension, fineness),
-        jet=lambda discrete, points: discrete.currents.jet(points, 1),
+        jet=jet,
         stated=stated,
         region=geometry.region,
         resolution=resolution,

@@ -13,7 +13,7 @@ from solved_coils import solved
 
 import magfem
 from magfem.constants import MU_0
-from magfem.errors import InputError, UnitMismatchError
+from magfem.errors import CardError, InputError, UnitMismatchError
 from magfem.fem.coil_solution import CoilSolution
 from magfem.fem.drive import quadrature
 from magfem.fields.norms import relative_errors
@@ -308,3 +308,33 @@ def test_quadrature_traces_ellipses():
     assert (np.abs(turning.axis(middle)[:, 2]) > 0.98).all()  # about the tube's axis; towards the ends it leans
     mean = np.mean([turning.coil.power(list(turning.currents(p).values())) for p in phases[:-1]])
     assert turning.power == pytest.approx(mean, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "damage"),
+    [
+        ("inductance", lambda a: a * np.nan),
+        ("circuit0_windings", lambda a: a[:, :4]),
+        ("circuit0_sheets_nodes", lambda a: a.astype(str)),
+    ],
+)
+def test_damaged_arrays_are_refused_in_one_line(tmp_path, name, damage):
+    folder = tmp_path / "loop"
+    magfem.solve(magfem.load_geometry("loop_50")).save(folder)
+    with np.load(folder / "fields.npz") as stored:
+        arrays = dict(stored)
+    np.savez(folder / "fields.npz", **arrays | {name: damage(arrays[name])})
+    with pytest.raises(CardError, match="not a whole solution") as caught:
+        magfem.load_solution(folder)
+    assert "\n" not in str(caught.value)
+
+
+def test_choices_for_other_devices_are_refused():
+    loop, magnet = magfem.load_geometry("loop_50"), magfem.load_geometry("sphere_magnet_5")
+    for call in (
+        lambda: magfem.solve(loop, dimension=3),
+        lambda: magfem.solve(loop, conduction="sheet"),
+        lambda: magfem.solve(magnet, conduction="sheet"),
+    ):
+        with pytest.raises(InputError, match="is a choice for"):
+            call()
