@@ -82,6 +82,12 @@ class FoilCoil(Device):
         self.check_shape()
         largest = max(self.winding.size)
         check_thickness(self.words, "dimensions", "the track's width", 10 * self.track_width, largest)
+        if self.leads.depth is not None and abs(self.leads.depth) > largest:
+            raise InvalidValue(
+                f"{self.words}: depth must be at most the winding's largest dimension "
+                f"({format_quantity(largest, 'length')}), got {format_quantity(self.leads.depth, 'length')}",
+                "leads.depth",
+            )
         self._check_layers()
         self._check_rolling()
         Ribbon(self._closed, self._bend)(0.25)  # a track that cannot be laid out is refused here

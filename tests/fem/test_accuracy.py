@@ -47,12 +47,12 @@ def test_ring_2d(ring_2d, ring_layers, ring_truth):
 
 def test_ring_3d(ring_3d, ring_layers, ring_truth):
     B, gradient = worst(ring_3d, ring_layers, ring_truth)
-    assert B <= 1e-4 and gradient <= 5e-4
+    assert B <= 2e-5 and gradient <= 5e-5
 
 
 def test_rotor_3d_matches_its_azimuthal_mode(rotor_3d, rotor_layers, rotor_truth):
     B, gradient = worst(rotor_3d, rotor_layers, rotor_truth)
-    assert B <= 1e-4 and gradient <= 5e-4
+    assert B <= 1e-5 and gradient <= 2e-5
 
 
 @pytest.mark.parametrize("name", ["rigid_ring_2d", "rigid_ring_3d", "rigid_rotor_3d"])
