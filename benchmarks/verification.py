@@ -1,7 +1,7 @@
 """The tables and figures of docs/verification.md: `python benchmarks/verification.py [section …]`.
 
-Sections: magnets currents axis inductance halbach corners edges stator planar. All but `edges` take seconds; that one
-solves nine meshes of edge elements, some minutes. Figures go to docs/figures, or to the folder after `--figures`.
+Sections: devices magnets currents axis inductance halbach corners edges stator planar. All but `edges` take seconds;
+that one solves nine meshes of edge elements, some minutes. Figures go to docs/figures, or to the folder after `--figures`.
 """
 
 from __future__ import annotations
@@ -685,7 +685,29 @@ def planar() -> None:
     keep("planar_coil", 2.7, draw, 2)
 
 
-SECTIONS = (magnets, currents, axis, inductance, halbach, corners, edges, stator, planar)
+def devices() -> None:
+    """The picture of the README: three devices as `magfem show` draws them."""
+    from tempfile import TemporaryDirectory
+
+    from PIL import Image
+
+    from magfem.report import show_picture
+
+    wide = 300
+    pictures = []
+    with TemporaryDirectory() as folder:
+        for name in ("halbach_ring_16", "planar_coil_12mm", "stator_1.6x5.5"):
+            path = Path(folder) / f"{name}.png"
+            show_picture(magfem.load_geometry(name), path)
+            shown = Image.open(path).convert("RGB")
+            pictures.append(shown.resize((wide, wide * shown.height // shown.width), Image.Resampling.LANCZOS))
+    row = Image.new("RGB", (wide * len(pictures), max(picture.height for picture in pictures)), "white")
+    for place, picture in enumerate(pictures):
+        row.paste(picture, (wide * place, (row.height - picture.height) // 2))
+    row.quantize(64, dither=Image.Dither.NONE).save(FIGURES / "devices.png", optimize=True)
+
+
+SECTIONS = (devices, magnets, currents, axis, inductance, halbach, corners, edges, stator, planar)
 
 if __name__ == "__main__":
     wanted = sys.argv[1:]
