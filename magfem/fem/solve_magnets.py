@@ -24,7 +24,7 @@ log = logging.getLogger("magfem")
 RESOLUTIONS = {2: (0.25, 8.0), 3: (0.5, 4.0)}
 """Smallest and largest resolution by dimension: below, walls are not resolved; above, memory runs out."""
 
-_STATED = {2: 1.0, 3: 1.8}
+_STATED = {2: 1.0, 3: 1.6}
 """Stated error over the difference between solutions on elements of full and of twice the size, by dimension.
 
 With errors that fall with order p the finer one's is the difference over 2^p − 1: all of it in 3D, where the limits on
@@ -40,7 +40,7 @@ def solve_magnets(geometry: Magnets, dimension: int, resolution: float, toleranc
     started = time.perf_counter()
 
     def stated(difference: float, discrete: Discrete) -> float:
-        # The field is proportional to the magnet's volume, which no difference of `jet` shows: twice its error is added.
+        # The field is proportional to the volume, which no difference of `jet` shows: twice its error is added.
         return max(_STATED[dimension] * difference + 2 * _misshape(geometry, discrete), _ROUNDING)
 
     def jet(discrete: Discrete, points: Points) -> Jet:
