@@ -235,7 +235,8 @@ def test_models_keep_what_they_state(model, thickness):
 
 
 @pytest.mark.parametrize(
-    ("thickness", "clearance", "model"), [(10e-6, 1e-3, "sheet"), (0.4e-3, 1e-3, "solid"), (0.4e-3, 0.2, "filament")]
+    ("thickness", "clearance", "model"),
+    [(10e-6, 1e-3, "sheet"), (0.4e-3, 1e-3, "sheet"), (0.5e-3, 1e-3, "solid"), (0.4e-3, 0.2, "filament")],
 )
 def test_models_are_chosen_by_thickness_and_clearance(thickness, clearance, model):
     found = _solve_track(ring(4.8e-3, 5.2e-3, thickness), RHO, clearance, 1.0, None)

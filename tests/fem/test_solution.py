@@ -202,7 +202,7 @@ def test_what_does_not_fit_is_refused_before_anything_is_solved(rotor, monkeypat
         asked.append(resolution)
         raise InputError("too large")
 
-    monkeypatch.setattr(import_module("magfem.fem.solve"), "generate", refuse)
+    monkeypatch.setattr(import_module("magfem.fem.solve_magnets"), "generate", refuse)
     with pytest.raises(InputError, match="too large"):
         solve(rotor, resolution=2.0)
     assert asked == [2.0]
