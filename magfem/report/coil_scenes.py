@@ -174,7 +174,7 @@ def _space(geometry: Coil) -> Picture:
             if number == 0:
                 axes_cross(axes, seen)
             if apart:
-                axes.set_title(circuits[0].name)
+                axes.text(0.5, 0.99, circuits[0].name, transform=axes.transAxes, ha="center", va="top")
         drawn.legend(handles=_legend(geometry), loc="outside lower right", ncols=2, handlelength=1.0)
         content = png(drawn)
     leads = " Paler: leads." if len(_legend(geometry)) > 1 else ""
