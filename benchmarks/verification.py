@@ -1,7 +1,8 @@
 """The tables and figures of docs/verification.md: `python benchmarks/verification.py [section …]`.
 
 Sections: devices magnets currents axis inductance halbach corners edges stator planar. All but `edges` take seconds;
-that one solves nine meshes of edge elements, some minutes. Figures go to docs/figures, or to the folder after `--figures`.
+that one solves nine meshes of edge elements, some minutes. Figures go to docs/figures, or to the folder after
+`--figures`.
 """
 
 from __future__ import annotations
