@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from argparse import Namespace
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -73,19 +74,23 @@ def _check_format(path: Path, dimension: int | None) -> None:
 def _magnets(options: Namespace, geometry: Magnets, dimension: int, path: Path) -> int:
     from magfem.mesh.export import write_mesh
     from magfem.mesh.generate import generate
+    from magfem.mesh.quality import quality
 
     mesh = generate(geometry, dimension, options.resolution)
     write_mesh(mesh, path)
     cells, nodes = len(mesh.cells), len(mesh.points)
     kind = "tetrahedra" if dimension == 3 else "triangles"
+    shape = quality(mesh)
     show_result(
         options,
-        f"{geometry.name}: {cells} {kind}, {nodes} nodes in {path}",
+        f"{geometry.name}: {cells} {kind} (quality at least {shape.least:.2f}, {shape.mean:.2f} on average), "
+        f"{nodes} nodes in {path}",
         {
             "output": str(path),
             "dimension": dimension,
             "cells": cells,
             "nodes": nodes,
+            "quality": asdict(shape),
             "bodies": {name: int((mesh.body == index).sum()) for index, name in enumerate(mesh.names)},
         },
     )
@@ -96,10 +101,17 @@ def _coil(options: Namespace, geometry: Coil, path: Path) -> int:
     """The surface of the conductors."""
     import numpy as np
 
+    from magfem.geometry import FoilTrack, check_ribbon
     from magfem.mesh.coil_surfaces import coil_surfaces, quadrilaterals
     from magfem.mesh.export import write_cells
+    from magfem.mesh.lattice import shape_of
 
+    for circuit in geometry.circuits:
+        for part in circuit.parts:
+            if isinstance(part, FoilTrack):
+                check_ribbon(part, options.resolution)
     surfaces = coil_surfaces(geometry, options.resolution)
+    sine, aspect = shape_of(np.concatenate([surface.nodes for surface in surfaces]))
     points, cells, owner = quadrilaterals(surfaces)
     names = tuple(surface.name for surface in surfaces)
     lead = np.concatenate([surface.lead for surface in surfaces]).astype(np.int32)
@@ -111,6 +123,7 @@ def _coil(options: Namespace, geometry: Coil, path: Path) -> int:
             "output": str(path),
             "cells": len(cells),
             "nodes": len(points),
+            "quality": {"least_sine": sine, "largest_aspect": aspect},
             "circuits": {name: int((owner == index).sum()) for index, name in enumerate(names)},
         },
     )

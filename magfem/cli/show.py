@@ -72,7 +72,12 @@ def _magnet_data(geometry: Magnets) -> dict[str, Any]:
         "moment": geometry.moment,
         "feature_size": geometry.feature_size,
         "bodies": [
-            {"name": body.name, "volume": body.volume, "magnetisation": body.material.remanence_vector}
+            {
+                "name": body.name,
+                "volume": body.volume,
+                "remanence": body.material.remanence_vector,
+                "recoil_permeability": body.material.recoil_permeability,
+            }
             for body in geometry.bodies
         ],
         "dimension": _dimension(geometry),

@@ -81,7 +81,7 @@ def add_currents(
     gradient: Floats,
     hessian: Floats,
 ) -> None:
-    """Add all elements `distant` (6, q, t), places then strengths, of triangles whose `share` (t,) is one.
+    """Add all elements `distant` (6, q, t), places then strengths, whose `share` (t,) is one.
 
     The same sums as `add_current`, written for vector units; the hessian, rarely wanted, is not.
     """

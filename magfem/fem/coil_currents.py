@@ -1,7 +1,7 @@
 """Where the current of a circuit flows, whatever carries it, and what follows by integrals over it.
 
-Per ampere throughout. Sheets, faces and filaments are integrated in `sheet_currents`, `conduction` and
-`fields.filament`; coaxial windings have closed forms.
+Per ampere throughout. Sheets and faces are integrated in `sheet_currents`, filaments in `fields.filament`; coaxial
+windings have closed forms.
 """
 
 from __future__ import annotations

@@ -86,7 +86,7 @@ class CoilSolution(Evaluated):
 
     error: stated bounds `B` and `gradient`, relative, over the device's region (the norm of `fields.norms`), and
     `model`, the estimated share of B that the description of the conductor leaves out.
-    stats: unknowns, cells, seconds, peak_bytes.  settings: resolution and conduction.
+    stats: unknowns, cells, quality, seconds, peak_bytes.  settings: resolution and conduction.
     """
 
     geometry: Coil
@@ -136,10 +136,10 @@ class CoilSolution(Evaluated):
             chosen = [self.circuit(name) for name in currents]
             values = list(currents.values())
         else:
-            values = [float(value) for value in np.asarray(currents, dtype=float).ravel()]
+            values = self._one_each(currents).tolist()
             chosen = list(self.circuits)
-        if len(values) != len(chosen) or not values:
-            raise InputError(f"{self.geometry.name} has {len(self.circuits)} circuits, got {len(values)} currents")
+        if not values:
+            raise InputError(f"{self.geometry.name}: at least one circuit must be named with its current")
         fields = tuple(Scaled(circuit, value, "T") for circuit, value in zip(chosen, values, strict=True))
         return fields[0] if len(fields) == 1 else Summed(fields)
 
@@ -152,14 +152,21 @@ class CoilSolution(Evaluated):
 
         return inductance_matrix([circuit.currents for circuit in self.circuits])
 
+    def _one_each(self, currents: ArrayLike) -> Floats:
+        """One current (A) for each circuit. Raises InputError for another number of them."""
+        values = np.asarray(currents, dtype=float).ravel()
+        if values.size != len(self.circuits):
+            raise InputError(f"{self.geometry.name} has {len(self.circuits)} circuits, got {values.size} currents")
+        return values
+
     def energy(self, currents: ArrayLike) -> float:
         """Stored magnetic energy (J) at one current (A) for each circuit: ½ Iᵀ L I."""
-        current = np.asarray(currents, dtype=float).reshape(len(self.circuits))
+        current = self._one_each(currents)
         return float(0.5 * current @ self.inductance @ current)
 
     def power(self, currents: ArrayLike) -> float:
         """Heat (W) at one current (A) for each circuit: Σ R I²."""
-        current = np.asarray(currents, dtype=float).reshape(len(self.circuits))
+        current = self._one_each(currents)
         return float(sum(circuit.resistance * i**2 for circuit, i in zip(self.circuits, current, strict=True)))
 
     @property

@@ -96,13 +96,14 @@ def solve_sheet(track: FoilTrack, resistivity: float, resolution: float, element
 
 def solve_solid(
     track: FoilTrack, sheet: SheetConduction, resistivity: float, resolution: float, elements: int
-) -> tuple[SheetCurrents, float]:
-    """The surface of a thick track that carries 1 A, with σV for its stream function; the resistance (Ω, from below).
+) -> tuple[SheetCurrents, float, int]:
+    """The surface of a thick track that carries 1 A, with σV for its stream function; the resistance (Ω, from below);
+    the number of unknowns.
 
     sheet: the same track solved as a foil, for its lattice. The thickness gets half as many elements as the width.
     The layer integral of what is returned is B, see above.
     """
-    through = places_across(max(2, round(0.5 * elements * resolution)), graded=True)
+    through = places_across(solid_elements(elements, resolution), graded=True)
     levels = [lattice(sheet.stations, sheet.across, 0.5 * track.thickness * level) for level in through]
     points = np.stack(levels, axis=2)
     form = LatticeForm.of(points)
@@ -120,7 +121,12 @@ def solve_solid(
         np.concatenate([patches(place) for place, _ in sides]),
         np.concatenate([patches(value) for _, value in sides]),
     )
-    return faces, resistivity / conductance
+    return faces, resistivity / conductance, form.size
+
+
+def solid_elements(elements: int, resolution: float) -> int:
+    """Elements through the thickness of a thick track that has `elements`, times the resolution, across."""
+    return max(2, round(0.5 * elements * resolution))
 
 
 def evenly_spread(stations: Stations, turns: float) -> SheetCurrents:

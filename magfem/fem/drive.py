@@ -27,8 +27,7 @@ QUADRATURE = math.pi / 2
 class TurningField:
     """The field of two circuits under sinusoidal currents.
 
-    coil: its first two circuits, or those of `names`, carry the currents.  amplitude: A.  lag: rad, of the second
-    current behind the first.
+    names: the circuits, the leading one first.  amplitude: A.  lag: rad, of the second current behind the first.
     """
 
     coil: CoilSolution
@@ -91,6 +90,8 @@ def quadrature(
         names = (coil.circuits[0].name, coil.circuits[1].name)
     for name in names:
         coil.circuit(name)
+    if names[0] == names[1]:
+        raise InputError(f"a quadrature drive needs two different circuits, got {names[0]!r} twice")
     for label, value in (("amplitude", amplitude), ("lag", lag)):
         if not math.isfinite(value):
             raise InputError(f"{label} must be finite, got {value}")

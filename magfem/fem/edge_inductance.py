@@ -23,6 +23,7 @@ from magfem.mesh.coil_in_air import (
     windings_size,
 )
 from magfem.typing import Floats, Integers
+from magfem.units import quoted
 
 log = logging.getLogger("magfem")
 
@@ -107,7 +108,11 @@ def inductance_of_coil(coil: Coil, circuits: Sequence[str] | None = None, resolu
     Foil counts as a sheet without thickness. Raises InputError for coils that are neither all of foil nor all of
     coaxial windings, and as `inductance_by_edge_elements`.
     """
-    chosen = [circuit for circuit in coil.circuits if circuits is None or circuit.name in circuits]
+    known = {circuit.name: circuit for circuit in coil.circuits}
+    for name in circuits or ():
+        if name not in known:
+            raise InputError(f"{coil.name} has no circuit {quoted(name)}; it has {', '.join(map(quoted, known))}")
+    chosen = [known[name] for name in circuits or known]
     parts = [part for circuit in chosen for part in circuit.parts]
     if all(isinstance(part, CoaxialWinding) for part in parts):
         return inductance_by_edge_elements(

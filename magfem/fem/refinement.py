@@ -57,8 +57,8 @@ def refine(
             return Refined(solved, resolution, (error[0], error[1]))
         if 2 * resolution > finest:
             raise ConvergenceError(
-                f"the stated error of B is {error[0]:.1e} at resolution {resolution:g}, the finest that fits; "
-                f"a tolerance of {tolerance:g} is out of reach"
+                f"the stated error of B is {error[0]:.1e} at resolution {resolution:g}, and twice of that is "
+                f"beyond {finest:g}; a tolerance of {tolerance:g} is out of reach"
             )
         resolution, coarse = 2 * resolution, fine
 

@@ -13,7 +13,7 @@ from magfem.constants import MU_0
 from magfem.errors import InputError
 from magfem.fem.coil_currents import CoilCurrents
 from magfem.fem.coil_solution import CoilSolution, SolvedCircuit
-from magfem.fem.conduction import evenly_spread, solve_sheet, solve_solid
+from magfem.fem.conduction import evenly_spread, solid_elements, solve_sheet, solve_solid
 from magfem.fem.refinement import peak_bytes, refine
 from magfem.fem.sheet_currents import SheetCurrents
 from magfem.fields.filament import Filaments
@@ -31,8 +31,8 @@ RESOLUTIONS = (0.5, 4.0)
 _STATED = 0.5
 """Stated error over the difference between solutions on elements of full and of twice the size. Errors fall at least
 fourfold from one to the next, so that a third would do; what is more covers points that were not sampled."""
-MOST_UNKNOWNS = 1e6
-"""What one track may ask for: about 2 GB of memory and a minute."""
+MOST_UNKNOWNS, MOST_SOLID_UNKNOWNS = 1e6, 2e5
+"""What one track may ask for as a sheet, and as a solid: about 2 GB of memory and a minute."""
 
 _ROUNDING = 1e-9  # closed forms of windings are not stated to be better than this
 _ACROSS, _ACROSS_CORNERS = 4, 8  # elements across a track at resolution 1, and across one that turns corners
@@ -99,7 +99,9 @@ def solve_coil(
 
 def _quality(circuits: list[SolvedCircuit]) -> dict[str, float]:
     """Shape of the worst patch of all circuits; nothing for coils of closed forms only."""
-    sheets = [circuit.currents.within.nodes for circuit in circuits if circuit.currents.within.count]
+    currents = [circuit.currents for circuit in circuits]
+    solved = [own.faces if own.faces.count else own.sheets for own in currents]
+    sheets = [patches.nodes for patches in solved if patches.count]
     if not sheets:
         return {}
     sine, aspect = shape_of(np.concatenate(sheets))
@@ -171,15 +173,19 @@ def _solve_track(
     # What the error statement alone is made from may be coarser than any mesh that users get.
     stations = check_ribbon(track, resolution) if resolution >= RESOLUTIONS[0] else track.stations(resolution)
     across = _ACROSS_CORNERS if _has_corners(stations) else _ACROSS
-    _check_size(len(stations.left) * 2 * across * resolution, resolution)
+    _check_size(len(stations.left) * (2 * across * resolution + 1), resolution, MOST_UNKNOWNS)
+    if model == "solid":
+        through = solid_elements(across, resolution)
+        solid = len(stations.left) * (2 * across * resolution + 1) * (2 * through + 1)
+        _check_size(solid, resolution, MOST_SOLID_UNKNOWNS)
     sheet = solve_sheet(track, resistivity, resolution, across)
-    bounds = sheet.bounds
+    bounds, unknowns = sheet.bounds, sheet.unknowns
     if model == "filament":
         currents = _centreline(track, resolution)
     else:
         coarse = solve_sheet(track, resistivity, resolution / 2, _ACROSS)
         if model == "solid":
-            faces, resistance = solve_solid(track, sheet, resistivity, resolution, across)
+            faces, resistance, unknowns = solve_solid(track, sheet, resistivity, resolution, across)
             bounds = (resistance, max(resistance, bounds[1]))  # the even current of a sheet dissipates no less
             currents = CoilCurrents(faces=faces, within=coarse.currents(track.thickness, layers=5))
         else:
@@ -195,16 +201,16 @@ def _solve_track(
         lead_resistance=sheet.lead_share * sheet.resistance,
         crowding=sheet.crowding,
         section=track.width * track.thickness,
-        unknowns=sheet.unknowns,
+        unknowns=unknowns,
     )
 
 
-def _check_size(unknowns: float, resolution: float) -> None:
+def _check_size(unknowns: float, resolution: float, most: float) -> None:
     """Raise InputError for a track that would not fit into memory."""
-    if unknowns > MOST_UNKNOWNS:
+    if unknowns > most:
         raise InputError(
             f"about {unknowns:.1e} unknowns would be needed for one track at resolution {resolution:g}, and at most "
-            f"{MOST_UNKNOWNS:.0e} fit: lower the resolution to {resolution * (MOST_UNKNOWNS / unknowns) ** 0.5:.2g}"
+            f"{most:.0e} fit: lower the resolution to {resolution * (most / unknowns) ** 0.5:.2g}"
         )
 
 

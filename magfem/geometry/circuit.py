@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import pi
 from typing import TypeAlias
 
 from magfem.typing import Booleans, Floats
@@ -68,7 +69,7 @@ class CoaxialWinding:
     @property
     def wire_length(self) -> float:
         """m"""
-        return abs(self.turns) * 3.141592653589793 * (self.inner_radius + self.outer_radius)
+        return abs(self.turns) * pi * (self.inner_radius + self.outer_radius)
 
     @property
     def volume(self) -> float:

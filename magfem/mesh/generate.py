@@ -5,10 +5,12 @@ from __future__ import annotations
 import logging
 from typing import Any
 
+import numpy as np
+
 from magfem.errors import InputError
 from magfem.geometry import Magnets, MeshedMagnets
 from magfem.mesh.external import mesh_in_air
-from magfem.mesh.mesh import Mesh
+from magfem.mesh.mesh import Mesh, body_volumes, check_volumes
 from magfem.mesh.reading import read_mesh
 from magfem.mesh.session import gmsh_session
 from magfem.mesh.sizes import check_count, element_sizes, local_sizes, set_size_field
@@ -23,9 +25,17 @@ BALL = 1.35
 def generate(geometry: Magnets, dimension: int, resolution: float = 1.0) -> Mesh:
     """Mesh `geometry` in `dimension` 2 or 3 (2: the half plane of a body of revolution).
 
-    Bodies may touch. Raises MeshError when Gmsh fails or loses a body, InputError for bodies that overlap and for a
-    mesh that would not fit into memory.
+    Bodies may touch. Raises MeshError when Gmsh fails, loses a body or misses a volume by 1e-3, InputError for
+    bodies that overlap and for a mesh that would not fit into memory.
     """
+    mesh = _generate(geometry, dimension, resolution)
+    volume = {body.name: body.volume for body in geometry.bodies}
+    check_volumes(body_volumes(mesh), np.array([volume[name] for name in mesh.names]), mesh.names, tolerance=1e-3)
+    log.info("mesh: %d %s", mesh.cells.shape[0], "tetrahedra" if dimension == 3 else "triangles")
+    return mesh
+
+
+def _generate(geometry: Magnets, dimension: int, resolution: float) -> Mesh:
     if isinstance(geometry, MeshedMagnets):
         return mesh_in_air(geometry.surfaces, geometry.feature_size, geometry.hull.radius, resolution)
     wanted = element_sizes(geometry, dimension, resolution)
@@ -52,9 +62,7 @@ def generate(geometry: Magnets, dimension: int, resolution: float = 1.0) -> Mesh
             _fill(gmsh)
         gmsh.model.mesh.setOrder(2)
         indices = {tag: names.index(name) for tag, name in body_of.items()}
-        mesh = read_mesh(gmsh, dimension, indices, names, BALL * geometry.hull.radius)
-    log.info("mesh: %d %s", mesh.cells.shape[0], "tetrahedra" if dimension == 3 else "triangles")
-    return mesh
+        return read_mesh(gmsh, dimension, indices, names, BALL * geometry.hull.radius)
 
 
 def _bodies_of_pieces(owner: list[str], pieces: list[list[tuple[int, int]]]) -> dict[int, str]:

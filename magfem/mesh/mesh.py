@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from magfem.errors import MeshError
+from magfem.mesh.shape_functions import shape_gradients, tetrahedron_rule, triangle_rule, triangle_shapes
 from magfem.typing import Floats, Integers
 
 # Local faces of a tetrahedron seen from outside: three corners, then the mid-edge nodes between them.
@@ -78,6 +79,23 @@ class Mesh:
         partner[first], partner[second] = owner[second], owner[first]
         count = np.where(partner >= 0, 2, 1)
         return facets, owner, count, partner
+
+
+def body_volumes(mesh: Mesh) -> Floats:
+    """Volume (b,) m³ of every body as meshed, curved walls and all; of the body of revolution for half sections."""
+    if mesh.dimension == 3:
+        local, weights = tetrahedron_rule(5)
+        jacobian = np.einsum("eai,qaj->eqij", mesh.points[mesh.cells], shape_gradients(local), optimize=True)
+        volume = np.linalg.det(jacobian) @ weights
+    else:
+        local, weights = triangle_rule(6)
+        shapes, du, dv = triangle_shapes(local)
+        nodes = mesh.points[mesh.cells]
+        xu, xv = (np.einsum("qa,eai->eqi", slope, nodes) for slope in (du, dv))
+        area = xu[..., 0] * xv[..., 1] - xu[..., 1] * xv[..., 0]
+        volume = 2 * np.pi * (np.einsum("qa,ea->eq", shapes, nodes[..., 0]) * area) @ weights
+    inside = mesh.body >= 0
+    return np.bincount(mesh.body[inside], volume[inside], minlength=len(mesh.names)).astype(float)
 
 
 def check_volumes(measured: Floats, expected: Floats, names: tuple[str, ...], tolerance: float) -> None:

@@ -223,7 +223,7 @@ def test_circuits_and_currents():
         solution.circuit("middle")
     with pytest.raises(InputError, match="has 2 circuits, got 3 currents"):
         solution.driven([1, 2, 3])
-    with pytest.raises(InputError, match="got 0 currents"):
+    with pytest.raises(InputError, match="at least one circuit must be named"):
         solution.driven({})
 
 

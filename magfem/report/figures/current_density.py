@@ -36,7 +36,7 @@ class DensityMap:
 def density_map(circuit: Circuit, sheets: SheetCurrents) -> DensityMap | None:
     """Of the turns of a foil circuit, leads apart; None when it is not of foil or was not solved as a sheet.
 
-    Two sheets stand for each foil's thickness, each with half of the current: the upper one is taken.
+    Several sheets stand for each foil's thickness, each with its share of the current: the uppermost is taken.
     """
     tracks = [part for part in circuit.parts if isinstance(part, FoilTrack)]
     if not sheets.count or len(tracks) < len(circuit.parts):
@@ -56,7 +56,8 @@ def density_map(circuit: Circuit, sheets: SheetCurrents) -> DensityMap | None:
         -1, 4, 2
     )
     middle = 0.5 * (u[1:] + u[:-1])
-    density = 2 * _sheet_current(nodes, stream, middle).reshape(-1) / track.thickness
+    share = float(np.ptp(stream))  # of 1 A: ψ runs from 0 to it across the sheet
+    density = _sheet_current(nodes, stream, middle).reshape(-1) / (share * track.thickness)
     return DensityMap(corners, density, track.width, rolled)
 
 
@@ -132,12 +133,16 @@ def _level(nodes: Floats, rolled: bool) -> Floats:
 
 
 def _turns(track: FoilTrack, level: Floats, rolled: bool) -> Booleans:
-    """Which patches belong to the turns of a track: those in the upper (outer) half of its foil."""
+    """Which patches belong to the turns of a track: those of the uppermost (outermost) sheet in its foil."""
     stations = track.stations(0.5)
     middle = 0.5 * (stations.left + stations.right)[1::2][~stations.lead]
     own = float(np.median(_level(middle, rolled)))
     inside: Booleans = np.all((level > own) & (level < own + 0.5 * track.thickness), axis=1)
-    return inside
+    if not inside.any():
+        return inside
+    height = np.median(level, axis=1) - own
+    top: Booleans = inside & (height > height[inside].max() - 0.05 * track.thickness)
+    return top
 
 
 def _flat(places: Points, rolled: bool) -> Floats:
