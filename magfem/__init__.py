@@ -1,4 +1,4 @@
-"""magfem: from a magnet's geometry to a field model you may bet hardware on.
+"""magfem: from a magnet's or a coil's geometry to a field model you may bet hardware on.
 
     geometry = magfem.load_geometry("ring_magnet_4x1.5x1")
     solution = magfem.solve(geometry)

@@ -16,8 +16,8 @@ Run = Callable[[Namespace], int]
 """What a command does with its options; returns the exit code, 0 or 1."""
 
 _DESCRIPTION = """\
-From a magnet's geometry to a field model that states its own error: a device card becomes a mesh, a
-finite-element solution, a fitted model and a report. Every CARD, MODEL and RECIPE is a name that
+From a magnet's or a coil's geometry to a field model that states its own error: a device card becomes
+a mesh, a finite-element solution, a fitted model and a report. Every CARD, MODEL and RECIPE is a name that
 `magfem list` shows or the path of a file."""
 
 _EXAMPLES = """\
