@@ -9,6 +9,7 @@ import numpy as np
 
 from magfem.constants import MU_0
 from magfem.fields.hull import CylinderHull
+from magfem.geometry import Body, PermanentMagnet
 from magfem.typing import Floats
 
 
@@ -23,6 +24,10 @@ class Sphere:
     @property
     def hull(self) -> CylinderHull:
         return CylinderHull(2.0, 2.0)
+
+    @property
+    def bodies(self) -> tuple[Body, ...]:
+        return (Body("magnet", PermanentMagnet(1.0), 4 * np.pi / 3, 4 * np.pi),)
 
     def build(self, occ: Any) -> dict[str, list[int]]:
         return {"magnet": [occ.addSphere(*self.offset, 1.0)]}
