@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from magfem.compiled import kernel, summing_kernel
+from magfem.constants import MU_0
 from magfem.typing import Floats
 
 
@@ -19,6 +20,22 @@ def _add_sums(sums: tuple[float, ...], order: int, value: Floats, gradient: Floa
         if order > 0:
             for j in range(3):
                 gradient[i, j] += sums[3 + 3 * i + j]
+
+
+@kernel
+def put_sums(
+    i: int, order: int, b: Floats, g: Floats, h: Floats, value: Floats, gradient: Floats, hessian: Floats
+) -> None:
+    """Write the sums at point `i`, times µ0/4π, into the arrays of a jet."""
+    factor = MU_0 / (4.0 * np.pi)
+    for j in range(3):
+        value[i, j] = factor * b[j]
+        if order > 0:
+            for k in range(3):
+                gradient[i, j, k] = factor * g[j, k]
+                if order > 1:
+                    for m in range(3):
+                        hessian[i, j, k, m] = factor * h[j, k, m]
 
 
 @kernel
@@ -204,58 +221,4 @@ def add_layers(
                 gzx += kz * ux
                 gzy += kz * uy
                 gzz += kz * uz
-    _add_sums((ax, ay, az, gxx, gxy, gxz, gyx, gyy, gyz, gzx, gzy, gzz), order, A, gradient)
-
-
-@summing_kernel
-def add_patch_current(x: float, y: float, z: float, near: Floats, order: int, B: Floats, gradient: Floats) -> None:
-    """Add the elements `near` (6, q), places then strengths, as `add_current` does to order 0 or 1."""
-    bx = by = bz = 0.0
-    gxx = gxy = gxz = gyx = gyy = gyz = gzx = gzy = gzz = 0.0
-    for q in range(near.shape[1]):
-        rx, ry, rz = x - near[0, q], y - near[1, q], z - near[2, q]
-        inverse = 1.0 / max(rx * rx + ry * ry + rz * rz, 1e-60)
-        i3 = inverse * np.sqrt(inverse)
-        kx, ky, kz = near[3, q] * i3, near[4, q] * i3, near[5, q] * i3
-        cx, cy, cz = ky * rz - kz * ry, kz * rx - kx * rz, kx * ry - ky * rx
-        bx += cx
-        by += cy
-        bz += cz
-        ux, uy, uz = -3.0 * inverse * rx, -3.0 * inverse * ry, -3.0 * inverse * rz
-        gxx += cx * ux
-        gxy += cx * uy - kz
-        gxz += cx * uz + ky
-        gyx += cy * ux + kz
-        gyy += cy * uy
-        gyz += cy * uz - kx
-        gzx += cz * ux - ky
-        gzy += cz * uy + kx
-        gzz += cz * uz
-    _add_sums((bx, by, bz, gxx, gxy, gxz, gyx, gyy, gyz, gzx, gzy, gzz), order, B, gradient)
-
-
-@summing_kernel
-def add_patch_layer(x: float, y: float, z: float, near: Floats, order: int, A: Floats, gradient: Floats) -> None:
-    """Add the elements `near` (6, q), places then strengths, as `add_layer` does to order 0 or 1."""
-    ax = ay = az = 0.0
-    gxx = gxy = gxz = gyx = gyy = gyz = gzx = gzy = gzz = 0.0
-    for q in range(near.shape[1]):
-        rx, ry, rz = x - near[0, q], y - near[1, q], z - near[2, q]
-        inverse = 1.0 / max(rx * rx + ry * ry + rz * rz, 1e-60)
-        i1 = np.sqrt(inverse)
-        kx, ky, kz = near[3, q] * i1, near[4, q] * i1, near[5, q] * i1
-        ax += kx
-        ay += ky
-        az += kz
-        if order > 0:
-            ux, uy, uz = -inverse * rx, -inverse * ry, -inverse * rz
-            gxx += kx * ux
-            gxy += kx * uy
-            gxz += kx * uz
-            gyx += ky * ux
-            gyy += ky * uy
-            gyz += ky * uz
-            gzx += kz * ux
-            gzy += kz * uy
-            gzz += kz * uz
     _add_sums((ax, ay, az, gxx, gxy, gxz, gyx, gyy, gyz, gzx, gzy, gzz), order, A, gradient)

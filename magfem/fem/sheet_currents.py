@@ -22,15 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from magfem.compiled import kernel
-from magfem.constants import MU_0
-from magfem.fem.biot_savart import (
-    add_current,
-    add_currents,
-    add_layer,
-    add_layers,
-    add_patch_current,
-    add_patch_layer,
-)
+from magfem.fem.biot_savart import add_currents, add_layers, put_sums
 from magfem.threads import in_chunks
 from magfem.typing import Floats, Jet, Points
 
@@ -121,7 +113,9 @@ class SheetCurrents:
         centre, half_u, half_v = self._extents()
         # One row for each coordinate, points of the rule before patches: the layout that vector units like.
         distant = np.concatenate([array.transpose(2, 1, 0) for array in self.elements(rules.far)]).copy()
-        near = np.concatenate([array.transpose(0, 2, 1) for array in self.elements(rules.near)], axis=1).copy()
+        near = np.concatenate([array.transpose(0, 2, 1) for array in self.elements(rules.near)], axis=1)[
+            :, :, None
+        ].copy()
         (u, wu), (v, wv) = (_gauss(count) for count in rules.near)
         limits = np.array([*rules.far_from, *rules.near_from])
 
@@ -216,8 +210,10 @@ def _evaluate(
         near2[p] = (max(limits[2] * reach_u, limits[3] * reach_v) + radius) ** 2
     stack = np.empty((_DEEPEST + 2, 5))
     work = np.empty((6, 3))
-    leaf = np.empty((6, near.shape[2]))
-    own = np.empty(3), np.empty((3, 3)), np.empty((3, 3, 3))
+    leaf = np.empty((6, 1, near.shape[3]))
+    each = np.ones(near.shape[3])
+    scratch = (stack, work, leaf, each)
+    own = (np.empty(3), np.empty((3, 3)), np.empty((3, 3, 3)))
     b = np.empty(3)
     g = np.zeros((3, 3))
     h = np.zeros((3, 3, 3))
@@ -229,53 +225,36 @@ def _evaluate(
         for p in range(count):
             dx, dy, dz = x - centre[p, 0], y - centre[p, 1], z - centre[p, 2]
             share[p] = 1.0 if dx * dx + dy * dy + dz * dz > far2[p] else 0.0
-        if layer:
-            add_layers(x, y, z, distant, share, order, b, g, h)
-        else:
-            add_currents(x, y, z, distant, share, order, b, g, h)
+        _add_elements(x, y, z, distant, share, order, layer, b, g, h)
         for p in range(count):
             if share[p] == 1.0:
                 continue
             dx, dy, dz = x - centre[p, 0], y - centre[p, 1], z - centre[p, 2]
             if dx * dx + dy * dy + dz * dz > near2[p]:
-                _add_points(x, y, z, near[p], order, layer, b, g, h)
+                _add_elements(x, y, z, near[p], each, order, layer, b, g, h)
             else:
-                _add_close(x, y, z, nodes[p], stream[p], rule, limits, order, layer, stack, work, leaf, own, b, g, h)
-        for j in range(3):
-            value[i, j] = MU_0 / (4.0 * np.pi) * b[j]
-            if order > 0:
-                for k in range(3):
-                    gradient[i, j, k] = MU_0 / (4.0 * np.pi) * g[j, k]
-            if order > 1:
-                for k in range(3):
-                    for m in range(3):
-                        hessian[i, j, k, m] = MU_0 / (4.0 * np.pi) * h[j, k, m]
+                _add_close(x, y, z, nodes[p], stream[p], rule, limits, order, layer, scratch, own, b, g, h)
+        put_sums(i, order, b, g, h, value, gradient, hessian)
 
 
 @kernel
-def _add_points(
+def _add_elements(
     x: float,
     y: float,
     z: float,
-    near: Floats,
+    elements: Floats,
+    share: Floats,
     order: int,
     layer: bool,
     b: Floats,
     g: Floats,
     h: Floats,
 ) -> None:
-    """Add the current elements `near` (6, q), places then strengths, of one patch or part of one."""
-    if order > 1:
-        for q in range(near.shape[1]):
-            rx, ry, rz = x - near[0, q], y - near[1, q], z - near[2, q]
-            if layer:
-                add_layer(rx, ry, rz, near[3, q], near[4, q], near[5, q], order, b, g, h)
-            else:
-                add_current(rx, ry, rz, near[3, q], near[4, q], near[5, q], order, b, g, h)
-    elif layer:
-        add_patch_layer(x, y, z, near, order, b, g)
+    """Add the current elements (6, q, p), places then strengths, whose `share` (p,) is one."""
+    if layer:
+        add_layers(x, y, z, elements, share, order, b, g, h)
     else:
-        add_patch_current(x, y, z, near, order, b, g)
+        add_currents(x, y, z, elements, share, order, b, g, h)
 
 
 @kernel
@@ -289,21 +268,19 @@ def _add_close(
     limits: Floats,
     order: int,
     layer: bool,
-    stack: Floats,
-    work: Floats,
-    leaf: Floats,
+    scratch: tuple[Floats, Floats, Floats, Floats],
     own: tuple[Floats, Floats, Floats],
     b: Floats,
     g: Floats,
     h: Floats,
 ) -> None:
     """One patch close to the point; when the point lies on it, the mean of both sides."""
-    touches = _sum_close(x, y, z, nodes, stream, rule, limits, order, layer, stack, work, leaf, own)
+    touches = _sum_close(x, y, z, nodes, stream, rule, limits, order, layer, scratch, own)
     if not touches:
         _add_own(1.0, own, order, b, g, h)
         return
     # Integrals of 1/r² over the last piece would depend on its shape: step off the sheet along its normal.
-    step = work[5]
+    step = scratch[1][5]
     for side in (-1.0, 1.0):
         _sum_close(
             x + side * step[0],
@@ -315,9 +292,7 @@ def _add_close(
             limits,
             order,
             layer,
-            stack,
-            work,
-            leaf,
+            scratch,
             own,
         )
         _add_own(0.5, own, order, b, g, h)
@@ -344,16 +319,15 @@ def _sum_close(
     limits: Floats,
     order: int,
     layer: bool,
-    stack: Floats,
-    work: Floats,
-    leaf: Floats,
+    scratch: tuple[Floats, Floats, Floats, Floats],
     own: tuple[Floats, Floats, Floats],
 ) -> bool:
     """Halve one patch until every part is far enough for the near rule; its sums are put into `own`.
 
-    True when the point lies on the patch, so that sums other than those of 1/r are worth nothing; `work[5]` is then a
-    small step along the normal.
+    True when the point lies on the patch, so that sums other than those of 1/r are worth nothing; `scratch[1][5]` is
+    then a small step along the normal.
     """
+    stack, work, leaf, each = scratch
     middle, west, east, south, north, step = work[0], work[1], work[2], work[3], work[4], work[5]
     b, g, h = own
     b[:] = 0.0
@@ -407,7 +381,7 @@ def _sum_close(
                 step *= size / np.sqrt((step**2).sum())
                 return True
         _fill_leaf(u0, u1, v0, v1, nodes, stream, rule, leaf)
-        _add_points(x, y, z, leaf, order, layer, b, g, h)
+        _add_elements(x, y, z, leaf, each, order, layer, b, g, h)
     return False
 
 
@@ -434,7 +408,7 @@ def _fill_leaf(
     rule: tuple[Floats, Floats, Floats, Floats],
     leaf: Floats,
 ) -> None:
-    """Current elements (6, q) of a part of a patch: places x, and (x_u ψ_v − x_v ψ_u) times the weights."""
+    """Current elements (6, 1, q) of a part of a patch: places x, and (x_u ψ_v − x_v ψ_u) times the weights."""
     us, vs, wu, wv = rule
     line = np.empty((3, 8))  # along u at one v: place, ∂/∂v of the place, ψ, ∂ψ/∂v at the three nodes
     for j in range(vs.size):
@@ -458,7 +432,7 @@ def _fill_leaf(
             w = wu[i] * wv[j] * (u1 - u0) * (v1 - v0)
             q = i * vs.size + j
             for k in range(3):
-                leaf[k, q] = a0 * line[0, k] + a1 * line[1, k] + a2 * line[2, k]
+                leaf[k, 0, q] = a0 * line[0, k] + a1 * line[1, k] + a2 * line[2, k]
                 xu = c0 * line[0, k] + c1 * line[1, k] + c2 * line[2, k]
                 xv = a0 * line[0, 3 + k] + a1 * line[1, 3 + k] + a2 * line[2, 3 + k]
-                leaf[3 + k, q] = w * (xu * sv - xv * su)
+                leaf[3 + k, 0, q] = w * (xu * sv - xv * su)

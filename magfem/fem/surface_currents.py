@@ -17,8 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from magfem.compiled import kernel
-from magfem.constants import MU_0
-from magfem.fem.biot_savart import add_current, add_currents
+from magfem.fem.biot_savart import add_current, add_currents, put_sums
 from magfem.mesh.shape_functions import triangle_rule, triangle_shapes
 from magfem.threads import in_chunks
 from magfem.typing import Floats, Jet, Points
@@ -156,15 +155,7 @@ def _evaluate(
                     g,
                     h,
                 )
-        for j in range(3):
-            B[i, j] = MU_0 / (4.0 * np.pi) * b[j]
-            if order > 0:
-                for k in range(3):
-                    gradient[i, j, k] = MU_0 / (4.0 * np.pi) * g[j, k]
-            if order > 1:
-                for k in range(3):
-                    for m in range(3):
-                        hessian[i, j, k, m] = MU_0 / (4.0 * np.pi) * h[j, k, m]
+        put_sums(i, order, b, g, h, B, gradient, hessian)
 
 
 @kernel
