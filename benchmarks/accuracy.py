@@ -21,8 +21,8 @@ from magfem.fem.solve_magnets import solve_once
 from magfem.fields.field import Field
 from magfem.fields.norms import relative_errors
 from magfem.fields.terms import Terms, concatenate, frame_about, harmonics
+from magfem.fields.terms_json import terms_from_list
 from magfem.fitting.least_squares import solve_least_squares
-from magfem.fitting.model import terms_from_list
 from magfem.geometry import Geometry
 from magfem.typing import Floats
 

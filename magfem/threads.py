@@ -10,17 +10,19 @@ from itertools import pairwise
 import numpy as np
 
 
-def in_chunks(run: Callable[[slice], None], count: int, at_least: int) -> None:
+def in_chunks(run: Callable[[slice], None], count: int, at_least: int, block: int = 1) -> None:
     """Call `run` on slices that cover range(count), in parallel when each gets `at_least` points or more.
 
-    Points are independent of each other, so the result does not depend on the number of threads.
+    Slices begin at multiples of `block`. Blocks are independent of each other, so the result does not depend on the
+    number of threads.
     """
     workers = max(1, min(_processors(), count // at_least))
     if workers == 1:
         run(slice(0, count))
         return
     pieces = 4 * workers  # points cost unequally: small pieces even that out
-    bounds = np.linspace(0, count, pieces + 1).astype(int)
+    bounds = np.linspace(0, count, pieces + 1).astype(int) // block * block
+    bounds[-1] = count
     with ThreadPoolExecutor(workers) as pool:
         list(pool.map(run, (slice(a, b) for a, b in pairwise(bounds))))
 

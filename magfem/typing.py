@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 Floats: TypeAlias = NDArray[np.float64]
 Integers: TypeAlias = NDArray[np.int64]
+Complexes: TypeAlias = NDArray[np.complex128]
 Booleans: TypeAlias = NDArray[np.bool_]
 
 Points: TypeAlias = Floats  # (..., 3) m
@@ -22,6 +23,7 @@ Outside: TypeAlias = Literal["raise", "nan", "extrapolate"]
 __all__ = [
     "ArrayLike",
     "Booleans",
+    "Complexes",
     "Floats",
     "Hessians",
     "Integers",

@@ -19,10 +19,10 @@ from scipy.sparse import coo_matrix, csr_matrix
 from scipy.special import eval_legendre
 
 from magfem.compiled import kernel
-from magfem.fields.solid_harmonics import Complexes, fill_table, schmidt_scale
+from magfem.fields.solid_harmonics import fill_table, schmidt_scale
 from magfem.mesh.mesh import Mesh
 from magfem.mesh.shape_functions import triangle_rule, triangle_shapes
-from magfem.typing import Floats, Integers, Points
+from magfem.typing import Complexes, Floats, Integers, Points
 
 DEGREE = 18
 """Harmonics kept on the sphere. Beyond, on a ball 1.35 times the device, less than 1e-5 of them comes back."""

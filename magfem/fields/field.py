@@ -70,6 +70,8 @@ class Evaluated(ABC):
         if order not in (0, 1, 2):
             raise InputError(f"order must be 0, 1 or 2, got {order!r}")
         array = as_points(points)
+        if array.ndim == 1 and (outside == "extrapolate" or self.region.contains(array)):
+            return tuple(part[0] for part in self.evaluate(array[None], order))  # one point, the short way
         flat = array.reshape(-1, 3)
         promised = promised_points(flat, self.region, outside)
         lead = array.shape[:-1]
@@ -246,7 +248,7 @@ def as_points(points: ArrayLike) -> Points:
     array = given.astype(float, copy=False)
     if array.ndim == 0 or array.shape[-1] != 3:
         raise InputError(f"points must have shape (..., 3), got {array.shape}")
-    if not np.isfinite(array).all():
+    if not (all(map(math.isfinite, array.tolist())) if array.ndim == 1 else np.isfinite(array).all()):
         raise InputError("points must be finite numbers")
     return array
 

@@ -28,6 +28,7 @@ import numpy as np
 
 from magfem.compiled import kernel
 from magfem.constants import MU_0
+from magfem.fields.packing import BLOCK, add_axisymmetric
 from magfem.typing import ArrayLike, Floats, Points, Vectors
 
 _SERIES_BELOW, _HESSIAN_SERIES_BELOW = 0.04, 0.12
@@ -118,12 +119,75 @@ def loop_vector_potential(points: ArrayLike, radius: float) -> Vectors:
 
 
 @kernel
-def add_loop(x: float, y: float, z: float, radius: float, current: float, order: int, out: Floats) -> None:
-    """Add the loop's jet at one point of its own frame to `out` (15,).
+def _integrals_off_axis(
+    alpha: float, beta2: float, far: float, near: float, K: float, E: float
+) -> tuple[float, float, float]:
+    """T(1, 3/2), T(1, 5/2), T(2, 7/2) from the complete elliptic integrals K, E of parameter 1 − near/far."""
+    root = sqrt(far)
+    t1_32 = 8.0 / beta2 * (alpha * K / root - root * E)
+    t1_52 = 8.0 / (3.0 * beta2 * root) * (alpha * E / near - K)
+    return t1_32, t1_52, 1.2 * (alpha * t1_52 - t1_32) / beta2
 
-    `out` holds B_x, B_y, B_z; then, from order 1, the gradient's xx, xy, xz, yy, yz; then, from order 2, the
-    hessian's xxx, xxy, xxz, xyy, xyz, yyy, yyz: both are symmetric and free of trace. SI units, `current` in
-    A (or turns, for T/A). The field on the wire itself is infinite or NaN.
+
+@kernel
+def _integrals_near_axis(alpha: float, ratio: float) -> tuple[float, float, float, float]:
+    """T(1, 3/2), T(1, 5/2), T(2, 7/2), T(3, 11/2) from their series in `ratio` = β²/α²."""
+    terms = 12 if ratio < _SERIES_BELOW else 22
+    inverse = 1.0 / alpha
+    power = inverse * sqrt(inverse)
+    t1_32 = power * _series(_T1_32, terms, ratio)
+    t1_52 = power * inverse * _series(_T1_52, terms, ratio)
+    t2_72 = power * inverse * inverse * _series(_T2_72, terms, ratio)
+    return t1_32, t1_52, t2_72, power * inverse**4 * _series(_T3_112, terms, ratio)
+
+
+@kernel
+def _next_integrals(alpha: float, product: float, t1_32: float, t1_52: float, t2_72: float) -> tuple[float, float]:
+    """T(1, 7/2) and T(2, 9/2); `product` is α² − β²."""
+    t1_72 = (0.8 * alpha * t1_52 + 0.2 * t1_32) / product
+    return t1_72, 6.0 / 7.0 * (t1_52 - alpha * t2_72 / 6.0) / product
+
+
+@kernel
+def _slopes(z: float, a2: float, c: float, t1_52: float, t1_72: float, t2_92: float) -> tuple[float, float]:
+    """F_s and G_s. G = 3zcQ with Q = T(1, 5/2): Q_α = −(5/2) T(1, 7/2), Q_β² = (35/24) T(2, 9/2)."""
+    F_s = 1.5 * c * (t1_52 - 5.0 * z * z * t1_72)
+    G_s = 3.0 * z * c * (35.0 / 6.0 * a2 * t2_92 - 2.5 * t1_72)
+    return F_s, G_s
+
+
+@kernel
+def _curvatures(
+    z: float,
+    a2: float,
+    c: float,
+    alpha: float,
+    product: float,
+    t1_52: float,
+    t2_72: float,
+    t1_72: float,
+    t2_92: float,
+    t3_112: float,
+) -> tuple[float, float]:
+    """G_sz and G_ss."""
+    t1_92 = (4.0 * alpha * t1_72 - 0.5 * t1_52) / (3.5 * product)
+    t2_112 = (4.0 * alpha * t2_92 + 0.5 * t2_72) / (4.5 * product)
+    t3_132 = (t2_92 - 0.1 * alpha * t3_112) / product * (10.0 / 11.0)
+    q_alpha2 = 8.75 * t1_92
+    q_alpha_beta2 = 35.0 / 24.0 * -4.5 * t2_112
+    q_beta4 = 35.0 / 24.0 * 2.475 * t3_132
+    q_s = 35.0 / 6.0 * a2 * t2_92 - 2.5 * t1_72
+    G_sz = 3.0 * c * (q_s + 2.0 * z * z * (q_alpha2 + 4.0 * a2 * q_alpha_beta2))
+    G_ss = 3.0 * z * c * (q_alpha2 + 8.0 * a2 * q_alpha_beta2 + 16.0 * a2 * a2 * q_beta4)
+    return G_sz, G_ss
+
+
+@kernel
+def add_loop(x: float, y: float, z: float, radius: float, current: float, order: int, out: Floats) -> None:
+    """Add the loop's jet at one point of its own frame to `out` (15,), packed.
+
+    SI units, `current` in A (or turns, for T/A). The field on the wire itself is infinite or NaN. For many points of
+    one loop `add_loops` is faster.
     """
     s = x * x + y * y
     rho = sqrt(s)
@@ -134,41 +198,22 @@ def add_loop(x: float, y: float, z: float, radius: float, current: float, order:
     near = (radius - rho) * (radius - rho) + z * z  # α − β, without cancellation
     product = far * near
     ratio = beta2 / (alpha * alpha)
-    t2_72 = t3_112 = 0.0
+    t3_112 = 0.0
     near_axis = ratio < (_SERIES_BELOW if order < 2 else _HESSIAN_SERIES_BELOW)
     if near_axis:
-        terms = 12 if ratio < _SERIES_BELOW else 22
-        inverse = 1.0 / alpha
-        power = inverse * sqrt(inverse)
-        t1_32 = power * _series(_T1_32, terms, ratio)
-        power *= inverse
-        t1_52 = power * _series(_T1_52, terms, ratio)
-        if order > 0:
-            power *= inverse
-            t2_72 = power * _series(_T2_72, terms, ratio)
-        if order > 1:
-            power *= inverse * inverse
-            t3_112 = power * _series(_T3_112, terms, ratio)
+        t1_32, t1_52, t2_72, t3_112 = _integrals_near_axis(alpha, ratio)
     else:
         K, E = complete_elliptic(near / far)
-        root = sqrt(far)
-        t1_32 = 8.0 / beta2 * (alpha * K / root - root * E)
-        t1_52 = 8.0 / (3.0 * beta2 * root) * (alpha * E / near - K)
-        t2_72 = 1.2 * (alpha * t1_52 - t1_32) / beta2
+        t1_32, t1_52, t2_72 = _integrals_off_axis(alpha, beta2, far, near, K, E)
     c = MU_0 / (4.0 * pi) * a2 * current
-    F = c * (0.5 * t1_32 + 1.5 * (a2 + z * z - s) * t1_52)
     G = 3.0 * z * c * t1_52
     out[0] += x * G
     out[1] += y * G
-    out[2] += F
+    out[2] += c * (0.5 * t1_32 + 1.5 * (a2 + z * z - s) * t1_52)
     if order < 1:
         return
-    t1_72 = (0.8 * alpha * t1_52 + 0.2 * t1_32) / product
-    t2_92 = 6.0 / 7.0 * (t1_52 - alpha * t2_72 / 6.0) / product
-    # G = 3zcQ with Q = T(1, 5/2): Q_α = −(5/2) T(1, 7/2), Q_β² = (35/24) T(2, 9/2).
-    q_alpha, q_beta2 = -2.5 * t1_72, 35.0 / 24.0 * t2_92
-    F_s = 1.5 * c * (t1_52 + 2.0 * z * z * q_alpha)  # G_z / 2
-    G_s = 3.0 * z * c * (q_alpha + 4.0 * a2 * q_beta2)
+    t1_72, t2_92 = _next_integrals(alpha, product, t1_32, t1_52, t2_72)
+    F_s, G_s = _slopes(z, a2, c, t1_52, t1_72, t2_92)
     out[3] += G + 2.0 * x * x * G_s
     out[4] += 2.0 * x * y * G_s
     out[5] += 2.0 * x * F_s
@@ -178,19 +223,119 @@ def add_loop(x: float, y: float, z: float, radius: float, current: float, order:
         return
     if not near_axis:
         t3_112 = (alpha * t2_92 - t2_72) / (0.9 * beta2)
-    t1_92 = (4.0 * alpha * t1_72 - 0.5 * t1_52) / (3.5 * product)
-    t2_112 = (4.0 * alpha * t2_92 + 0.5 * t2_72) / (4.5 * product)
-    t3_132 = (t2_92 - 0.1 * alpha * t3_112) / product * (10.0 / 11.0)
-    q_alpha2 = 8.75 * t1_92
-    q_alpha_beta2 = 35.0 / 24.0 * -4.5 * t2_112
-    q_beta4 = 35.0 / 24.0 * 2.475 * t3_132
-    G_sz = 3.0 * c * (q_alpha + 4.0 * a2 * q_beta2 + 2.0 * z * z * (q_alpha2 + 4.0 * a2 * q_alpha_beta2))
-    G_ss = 3.0 * z * c * (q_alpha2 + 8.0 * a2 * q_alpha_beta2 + 16.0 * a2 * a2 * q_beta4)
-    G_z = 2.0 * F_s
+    G_sz, G_ss = _curvatures(z, a2, c, alpha, product, t1_52, t2_72, t1_72, t2_92, t3_112)
     out[8] += x * (6.0 * G_s + 4.0 * x * x * G_ss)
     out[9] += y * (2.0 * G_s + 4.0 * x * x * G_ss)
-    out[10] += G_z + 2.0 * x * x * G_sz
+    out[10] += 2.0 * (F_s + x * x * G_sz)
     out[11] += x * (2.0 * G_s + 4.0 * y * y * G_ss)
     out[12] += 2.0 * x * y * G_sz
     out[13] += y * (6.0 * G_s + 4.0 * y * y * G_ss)
-    out[14] += G_z + 2.0 * y * y * G_sz
+    out[14] += 2.0 * (F_s + y * y * G_sz)
+
+
+# Rows of the work space of `ring_integrals`.
+S, ALPHA, PRODUCT, T1_32, T1_52, T2_72, T1_72, T2_92, T3_112, _BETA2, _FAR, _NEAR, _MEAN, _ROOT, _TOTAL = range(15)
+RING_ROWS = 15
+
+
+@kernel
+def ring_integrals(x: Floats, y: Floats, z: Floats, count: int, radius: float, order: int, work: Floats) -> None:
+    """The integrals T of a ring of `radius` at `count` points, and what they are made of, as rows of `work`.
+
+    x, y, z: (BLOCK,) m.  work: (RING_ROWS, BLOCK).  order: of the jet wanted; T(3, 11/2) is there from 2 on.
+    """
+    a2 = radius * radius
+    smallest = 1.0
+    for j in range(count):
+        s = x[j] * x[j] + y[j] * y[j]
+        rho = sqrt(s)
+        zz = z[j] * z[j]
+        far = (radius + rho) * (radius + rho) + zz
+        near = (radius - rho) * (radius - rho) + zz
+        work[S, j] = s
+        work[ALPHA, j] = a2 + s + zz
+        work[_BETA2, j] = 4.0 * a2 * s
+        work[_FAR, j] = far
+        work[_NEAR, j] = near
+        work[PRODUCT, j] = far * near
+        complement = near / far
+        work[_MEAN, j] = 1.0
+        work[_ROOT, j] = sqrt(complement)
+        work[_TOTAL, j] = 0.5 * (1.0 - complement)
+        smallest = min(smallest, complement)
+    # K and E as in `complete_elliptic`; the point nearest to the wire says how many steps all of them take.
+    weight = 0.5
+    for _ in range(_agm_steps(smallest)):
+        weight *= 2.0
+        for j in range(count):
+            difference = 0.5 * (work[_MEAN, j] - work[_ROOT, j])
+            product = work[_MEAN, j] * work[_ROOT, j]
+            work[_MEAN, j] = 0.5 * (work[_MEAN, j] + work[_ROOT, j])
+            work[_ROOT, j] = sqrt(product)
+            work[_TOTAL, j] += weight * difference * difference
+    for j in range(count):
+        K = 0.5 * pi / work[_MEAN, j]
+        E = K * (1.0 - work[_TOTAL, j])
+        alpha, product = work[ALPHA, j], work[PRODUCT, j]
+        t1_32, t1_52, t2_72 = _integrals_off_axis(alpha, work[_BETA2, j], work[_FAR, j], work[_NEAR, j], K, E)
+        work[T1_32, j] = t1_32
+        work[T1_52, j] = t1_52
+        work[T2_72, j] = t2_72
+        t1_72, t2_92 = _next_integrals(alpha, product, t1_32, t1_52, t2_72)
+        work[T1_72, j] = t1_72
+        work[T2_92, j] = t2_92
+        work[T3_112, j] = (alpha * t2_92 - t2_72) / (0.9 * work[_BETA2, j])
+    limit = _SERIES_BELOW if order < 2 else _HESSIAN_SERIES_BELOW
+    for j in range(count):
+        alpha = work[ALPHA, j]
+        if work[_BETA2, j] < limit * alpha * alpha:
+            t1_32, t1_52, t2_72, t3_112 = _integrals_near_axis(alpha, work[_BETA2, j] / (alpha * alpha))
+            work[T1_32, j], work[T1_52, j], work[T2_72, j], work[T3_112, j] = t1_32, t1_52, t2_72, t3_112
+            work[T1_72, j], work[T2_92, j] = _next_integrals(alpha, work[PRODUCT, j], t1_32, t1_52, t2_72)
+
+
+@kernel
+def _agm_steps(complement: float) -> int:
+    """How many steps of the arithmetic–geometric mean `complete_elliptic` takes."""
+    m, g = 1.0, sqrt(complement)
+    for step in range(1, 12):
+        difference = 0.5 * (m - g)
+        m, g = 0.5 * (m + g), sqrt(m * g)
+        if difference < 1e-9 * m:
+            return step
+    return 12
+
+
+@kernel
+def add_loops(
+    x: Floats, y: Floats, z: Floats, count: int, radius: float, current: float, order: int, out: Floats
+) -> None:
+    """Add one loop's jets at `count` points of its own frame to `out` (15, BLOCK), packed; as `add_loop`.
+
+    x, y, z: (BLOCK,) m.
+    """
+    work = np.empty((RING_ROWS, BLOCK))
+    ring_integrals(x, y, z, count, radius, order, work)
+    profile = np.empty((6, BLOCK))
+    a2 = radius * radius
+    c = MU_0 / (4.0 * pi) * a2 * current
+    for j in range(count):
+        t1_32, t1_52 = work[T1_32, j], work[T1_52, j]
+        profile[0, j] = c * (0.5 * t1_32 + 1.5 * (a2 + z[j] * z[j] - work[S, j]) * t1_52)
+        profile[1, j] = 3.0 * z[j] * c * t1_52
+        profile[2, j], profile[3, j] = _slopes(z[j], a2, c, t1_52, work[T1_72, j], work[T2_92, j])
+    if order > 1:
+        for j in range(count):
+            profile[4, j], profile[5, j] = _curvatures(
+                z[j],
+                a2,
+                c,
+                work[ALPHA, j],
+                work[PRODUCT, j],
+                work[T1_52, j],
+                work[T2_72, j],
+                work[T1_72, j],
+                work[T2_92, j],
+                work[T3_112, j],
+            )
+    add_axisymmetric(x, y, profile, count, order, out)

@@ -1,38 +1,59 @@
-"""Terms: the flat array of sources that every field model lowers to, and the one function that evaluates it.
+"""Terms: the flat array of sources that every field model lowers to, and the one call that evaluates it.
 
-A *source* is a loop or a set of solid harmonics, with a centre, a frame and a radius; it owns a run of
-*coefficients*. Concatenating two `Terms` adds their fields, so systems and sums stay one array and one call.
+A *source* has a kind (`term_kinds`), a centre, a frame and a radius; it owns a run of *coefficients* and, if it is a
+path, a run of *nodes*. Concatenating two `Terms` adds their fields, so systems and sums stay one array and one call.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
-from magfem.compiled import kernel
 from magfem.constants import MU_0
-from magfem.fields.loop import add_loop
-from magfem.fields.packing import unpack_gradient, unpack_hessian
-from magfem.fields.solid_harmonics import Complexes, add_harmonics, schmidt_scale
+from magfem.errors import InputError
+from magfem.fields.packing import BLOCK
+from magfem.fields.solid_harmonics import interior_scale, schmidt_scale
+from magfem.fields.term_kinds import CHARGE_DISC, HARMONIC, INTERIOR, LOOP, OBLATE, PATH
+from magfem.fields.terms_kernel import (
+    CONDUCTOR,
+    DISC,
+    LOOPS,
+    MIXED,
+    MIXED_INTERIOR,
+    OBLATE_DISC,
+    TRANSVERSE_COS,
+    TRANSVERSE_SIN,
+    ZONAL,
+    Packed,
+    evaluate,
+)
 from magfem.threads import in_chunks
-from magfem.typing import Floats, Integers, Jet, Points
+from magfem.typing import ArrayLike, Complexes, Floats, Integers, Jet, Points
 
-LOOP, HARMONIC = 0, 1
+HIGHEST_DEGREE = 80
+"""Of harmonics: factorials of twice this, and of the derivatives, still fit a float."""
+
 _PARALLEL_FROM = 4096  # points; below, starting threads costs more than it saves
+_NEUTRAL = 1e-9  # of the discs' charges taken one by one: their sum must be below
+_NONE: tuple[Floats, Floats] = (np.empty((0, 3, 3)), np.empty((0, 3, 3, 3)))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Terms:
-    """n sources in one frame, with c coefficients altogether.
+    """n sources in one frame, with c coefficients and v nodes altogether.
 
-    kind: (n,) LOOP or HARMONIC.  centre: (n, 3) m.  frame: (n, 3, 3), columns are the source's axes.
-    radius: (n,) m, a loop's radius or the harmonics' reference radius.
+    kind: (n,) of `term_kinds`.  centre: (n, 3) m.  frame: (n, 3, 3), columns are the source's axes.
+    radius: (n,) m, of a loop or disc, or the harmonics' reference radius.
     start: (n + 1,), source k owns the coefficients start[k]:start[k + 1].
-    degree, order: (c,), zero for loops.  sine: (c,), true for the h_lm.
-    coefficient: (c,), A (turns) for loops, T (T/A) for harmonics in Schmidt's semi-normalisation.
+    degree, order: (c,), zero but for harmonics.  sine: (c,), true for the h_lm, and for imaginary parts of OBLATE.
+    coefficient: (c,), A (turns) for loops and paths, T (T/A) for discs and for harmonics, these in Schmidt's
+    semi-normalisation.
+    node_start: (n + 1,), source k owns the nodes node_start[k]:node_start[k + 1].  nodes: (v, 3) m, in its frame.
     """
 
     kind: Integers
@@ -44,6 +65,8 @@ class Terms:
     order: Integers
     sine: Integers
     coefficient: Floats
+    node_start: Integers
+    nodes: Points
 
     def __add__(self, other: Terms) -> Terms:
         return concatenate([self, other])
@@ -61,61 +84,185 @@ class Terms:
         rotation = pose.rotation.as_matrix()
         return replace(self, centre=pose.apply(self.centre), frame=rotation @ self.frame)
 
+    def source(self, k: int) -> Terms:
+        """Source `k` alone."""
+        own, nodes = slice(self.start[k], self.start[k + 1]), slice(self.node_start[k], self.node_start[k + 1])
+        return Terms(
+            kind=self.kind[k : k + 1],
+            centre=self.centre[k : k + 1],
+            frame=self.frame[k : k + 1],
+            radius=self.radius[k : k + 1],
+            start=np.array([0, own.stop - own.start]),
+            degree=self.degree[own],
+            order=self.order[own],
+            sine=self.sine[own],
+            coefficient=self.coefficient[own],
+            node_start=np.array([0, nodes.stop - nodes.start]),
+            nodes=self.nodes[nodes],
+        )
+
+    @property
+    def owner(self) -> Integers:
+        """The source (c,) of every coefficient."""
+        return np.repeat(np.arange(self.kind.size), np.diff(self.start))
+
+    @property
+    def net_charge(self) -> float:
+        """Sum of the discs' magnetic charges over the sum of their sizes; zero for a field that exists."""
+        discs = self.kind[self.owner] == CHARGE_DISC
+        charges = self.coefficient[discs] * self.radius[self.owner[discs]] ** 2
+        total = float(np.abs(charges).sum())
+        return float(charges.sum()) / total if total > 0 else 0.0
+
+    def check_sources(self) -> None:
+        """Raise InputError for what cannot be a field in air: magnetic charge, monopoles, open or endless paths."""
+        if abs(self.net_charge) > _NEUTRAL:
+            raise InputError(
+                f"magnetic charge discs must cancel, a monopole does not exist: {self.net_charge:.1%} of their charge "
+                "remains"
+            )
+        harmonic = np.isin(self.kind[self.owner], (HARMONIC, INTERIOR, OBLATE))
+        lowest = np.where((self.kind[self.owner] == OBLATE) & (self.sine == 1), 0, 1)
+        wrong = (self.degree < lowest) | (self.degree > HIGHEST_DEGREE) | (self.order < 0) | (self.order > self.degree)
+        if np.any(harmonic & wrong):
+            raise InputError(
+                f"harmonics have degrees from 1 to {HIGHEST_DEGREE} (there is no monopole) and orders between 0 and "
+                "their degree"
+            )
+        if np.any((self.kind[self.owner] == OBLATE) & (self.order != 0)):
+            raise InputError("oblate sources are axial: their harmonics have order 0")
+        if np.any((self.kind == PATH) & (np.diff(self.node_start) < 3)):
+            raise InputError("a closed path needs three nodes or more")
+
     @property
     def moment(self) -> Floats:
-        """Magnetic dipole moment (3,) A·m² (A·m²/A for fields per ampere)."""
+        """Magnetic dipole moment (3,) A·m² (A·m²/A for fields per ampere) of all sources but those far away."""
         total = np.zeros(3)
         for k in range(self.kind.size):
             run = slice(self.start[k], self.start[k + 1])
+            local, values = np.zeros(3), self.coefficient[run]
             if self.kind[k] == LOOP:
-                local = np.array([0.0, 0.0, np.pi * self.radius[k] ** 2 * self.coefficient[run].sum()])
-            else:
-                local = np.zeros(3)
-                for m, sine, value in zip(self.order[run], self.sine[run], _of_degree_one(self, run), strict=True):
-                    local[2 if m == 0 else (1 if sine else 0)] += value
+                local[2] = np.pi * self.radius[k] ** 2 * values.sum()
+            elif self.kind[k] == HARMONIC:
+                dipole = np.where(self.degree[run] == 1, values, 0.0)
+                for axis, chosen in enumerate(((1, 0), (1, 1), (0, 0))):
+                    local[axis] = dipole[(self.order[run] == chosen[0]) & (self.sine[run] == chosen[1])].sum()
                 local *= 4 * np.pi / MU_0 * self.radius[k] ** 3
+            elif self.kind[k] == OBLATE:
+                # 1/R = 1/r + i a cos θ/r² + …: degree 0 gives a dipole by its imaginary part, degree 1 by its real one.
+                real, degree = self.sine[run] == 0, self.degree[run]
+                local[2] = values[real & (degree == 1)].sum() + values[~real & (degree == 0)].sum()
+                local *= 4 * np.pi / MU_0 * self.radius[k] ** 3
+            elif self.kind[k] == PATH:
+                nodes = self.nodes[self.node_start[k] : self.node_start[k + 1]]
+                local = 0.5 * values.sum() * np.cross(nodes, np.roll(nodes, -1, axis=0)).sum(axis=0)
+            elif self.kind[k] == CHARGE_DISC:
+                total += values.sum() / MU_0 * np.pi * self.radius[k] ** 2 * self.centre[k]
             total += self.frame[k] @ local
         return total
+
+    @cached_property
+    def packed(self) -> Packed:
+        """What the kernel reads."""
+        reals: list[Floats] = []
+        complexes: list[Complexes] = []
+        indices: list[Integers] = []
+        real_count = complex_count = 0
+        expanded: list[tuple[int, int, int, int, float]] = []  # source, how, first, last, value
+        for k in range(self.kind.size):
+            run = slice(int(self.start[k]), int(self.start[k + 1]))
+            degree, order, sine, values = self.degree[run], self.order[run], self.sine[run], self.coefficient[run]
+            kind = self.kind[k]
+            if kind in (LOOP, CHARGE_DISC):
+                expanded.append((k, LOOPS if kind == LOOP else DISC, 0, 0, float(values.sum())))
+            elif kind == PATH:
+                first, last = int(self.node_start[k]), int(self.node_start[k + 1])
+                expanded.append((k, CONDUCTOR, first, last, float(values.sum())))
+            elif kind == OBLATE:
+                dense = np.zeros(int(degree.max()) + 6, dtype=complex)
+                scale = np.array([schmidt_scale(int(l), 0) for l in degree])  # noqa: E741
+                # Re(−i h Q) = h Im Q, as for cosine and sine.
+                np.add.at(dense, 3 + degree, np.where(sine == 1, -1j, 1.0) * scale * values)
+                expanded.append((k, OBLATE_DISC, complex_count, complex_count + dense.size, 0.0))
+                complexes.append(dense)
+                indices.append(np.zeros((dense.size, 2), dtype=np.int64))
+                complex_count += dense.size
+            elif kind == HARMONIC and (np.all(order == 0) or np.all(order == 1)):
+                scale = np.array([schmidt_scale(int(l), int(order[0])) for l in degree])  # noqa: E741
+                for part in (0, 1):
+                    chosen = sine == part
+                    if not chosen.any() or (order[0] == 0 and part == 1):
+                        continue  # sin 0φ is nothing
+                    dense = np.zeros(int(degree.max()) + 6)
+                    np.add.at(dense, 3 + degree[chosen], (scale * values)[chosen])
+                    how = ZONAL if order[0] == 0 else TRANSVERSE_SIN if part else TRANSVERSE_COS
+                    expanded.append((k, how, real_count, real_count + dense.size, 0.0))
+                    reals.append(dense)
+                    real_count += dense.size
+            else:
+                scaling = schmidt_scale if kind == HARMONIC else interior_scale
+                scale = np.array([scaling(int(l), int(m)) for l, m in zip(degree, order, strict=True)])  # noqa: E741
+                sparse = np.where(sine == 1, -1j, 1.0) * scale * values
+                how = MIXED if kind == HARMONIC else MIXED_INTERIOR
+                expanded.append((k, how, complex_count, complex_count + sparse.size, 0.0))
+                complexes.append(sparse)
+                indices.append(np.stack([degree, order], axis=1))
+                complex_count += sparse.size
+        rows = [k for k, *_ in expanded]
+        count = len(rows)
+        layout = np.zeros((count, 5), dtype=np.int64)
+        layout[:, :3] = np.array([one[1:4] for one in expanded], dtype=np.int64).reshape(count, 3)
+        value = np.array([one[4] for one in expanded])
+        frames = self.frame[rows].reshape(count, 9)
+        layout[:, 3] = np.all(frames == np.eye(3).ravel(), axis=1)
+        layout[:-1, 4] = np.any(frames[1:] != frames[:-1], axis=1)
+        layout[-1:, 4] = 1
+        numbers = np.column_stack([self.radius[rows], self.centre[rows], frames, value])
+        return Packed(
+            layout,
+            np.ascontiguousarray(numbers),
+            np.concatenate([*reals, np.empty(0)]),
+            np.concatenate([*complexes, np.empty(0, dtype=complex)]),
+            np.concatenate([*indices, np.empty((0, 2), dtype=np.int64)]),
+            np.ascontiguousarray(self.nodes),
+        )
 
     def jet(self, points: Points, order: int = 1) -> Jet:
         """(B, gradient[, hessian]) at `points` (n, 3) m; `order` 0 gives B alone, 1 and 2 the derivatives."""
         points = np.ascontiguousarray(points, dtype=float)
         count = points.shape[0]
-        results = [np.empty((count, *(3,) * rank)) for rank in range(1, order + 2)]
-        work = [
-            array if rank <= order else np.empty((0, *(3,) * (rank + 1)))
-            for rank, array in enumerate(results + [np.empty(0)] * (2 - order))
-        ]
-        coefficients = _complex_coefficients(self)
+        B = np.empty((count, 3))
+        gradient = np.empty((count, 3, 3)) if order > 0 else _NONE[0]
+        hessian = np.empty((count, 3, 3, 3)) if order > 1 else _NONE[1]
+        packed = self.packed
 
         def run(chunk: slice) -> None:
-            parts = [array[chunk] if rank <= order else array for rank, array in enumerate(work)]
-            _evaluate(
-                points[chunk],
-                self.kind,
-                self.centre,
-                self.frame,
-                self.radius,
-                self.start,
-                self.degree,
-                self.order,
-                self.coefficient,
-                coefficients,
-                order,
-                *parts,
-            )
+            evaluate(points[chunk], *packed, order, B[chunk], gradient[chunk], hessian[chunk])
 
-        in_chunks(run, count, _PARALLEL_FROM)
-        return tuple(results)
+        if count < 2 * _PARALLEL_FROM:
+            evaluate(points, *packed, order, B, gradient, hessian)
+        else:
+            in_chunks(run, count, _PARALLEL_FROM, BLOCK)
+        return (B, gradient, hessian)[: order + 1]
 
 
-def loops(centre: Points, radius: Floats, current: Floats, frame: Floats | None = None) -> Terms:
+def loops(centre: Points, radius: ArrayLike, current: ArrayLike, frame: Floats | None = None) -> Terms:
     """Circular loops: centres (n, 3) m, radii (n,) m, currents (n,) A, one common frame (3, 3) (default: world)."""
+    return _singles(LOOP, centre, radius, current, frame)
+
+
+def charge_discs(centre: Points, radius: ArrayLike, density: ArrayLike, frame: Floats | None = None) -> Terms:
+    """Discs of magnetic charge: centres (n, 3) m, radii (n,) m, densities (n,) T, one common frame (3, 3)."""
+    return _singles(CHARGE_DISC, centre, radius, density, frame)
+
+
+def _singles(kind: int, centre: Points, radius: ArrayLike, value: ArrayLike, frame: Floats | None) -> Terms:
+    """Sources of one coefficient each, all in one frame."""
     centre = np.atleast_2d(np.asarray(centre, dtype=float))
     n = centre.shape[0]
     zeros = np.zeros(n, dtype=np.int64)
     return Terms(
-        kind=np.full(n, LOOP, dtype=np.int64),
+        kind=np.full(n, kind, dtype=np.int64),
         centre=centre,
         frame=np.tile(np.eye(3) if frame is None else frame, (n, 1, 1)),
         radius=np.broadcast_to(np.asarray(radius, dtype=float), (n,)).copy(),
@@ -123,8 +270,19 @@ def loops(centre: Points, radius: Floats, current: Floats, frame: Floats | None 
         degree=zeros,
         order=zeros,
         sine=zeros,
-        coefficient=np.broadcast_to(np.asarray(current, dtype=float), (n,)).copy(),
+        coefficient=np.broadcast_to(np.asarray(value, dtype=float), (n,)).copy(),
+        node_start=np.zeros(n + 1, dtype=np.int64),
+        nodes=np.empty((0, 3)),
     )
+
+
+def closed_path(
+    nodes: Points, current: float = 1.0, centre: Points | None = None, frame: Floats | None = None
+) -> Terms:
+    """A closed conductor through `nodes` (v, 3) m of its frame, in the direction of the current (A)."""
+    nodes = np.asarray(nodes, dtype=float)
+    source = _singles(PATH, np.zeros(3) if centre is None else centre, 1.0, current, frame)
+    return replace(source, node_start=np.array([0, len(nodes)]), nodes=nodes)
 
 
 def harmonics(
@@ -132,14 +290,18 @@ def harmonics(
     degree: Sequence[int],
     order: Sequence[int],
     sine: Sequence[bool],
-    coefficient: Floats,
+    coefficient: ArrayLike,
     centre: Points | None = None,
     frame: Floats | None = None,
+    kind: int = HARMONIC,
 ) -> Terms:
-    """One centre's exterior solid harmonics: reference radius m, and per coefficient (T) its degree, order, part."""
+    """One centre's solid harmonics: reference radius m, and per coefficient (T) its degree, order, part.
+
+    kind: HARMONIC (exterior), INTERIOR or OBLATE.
+    """
     c = len(degree)
     return Terms(
-        kind=np.array([HARMONIC], dtype=np.int64),
+        kind=np.array([kind], dtype=np.int64),
         centre=np.zeros((1, 3)) if centre is None else np.asarray(centre, dtype=float).reshape(1, 3),
         frame=(np.eye(3) if frame is None else np.asarray(frame, dtype=float)).reshape(1, 3, 3),
         radius=np.array([radius], dtype=float),
@@ -148,18 +310,28 @@ def harmonics(
         order=np.asarray(order, dtype=np.int64),
         sine=np.asarray(sine, dtype=np.int64),
         coefficient=np.broadcast_to(np.asarray(coefficient, dtype=float), (c,)).copy(),
+        node_start=np.zeros(2, dtype=np.int64),
+        nodes=np.empty((0, 3)),
     )
+
+
+def uniform(B: ArrayLike, radius: float = 1.0) -> Terms:
+    """A uniform field B (3,) T, as interior harmonics of degree 1: B = −∇V with V = −B·x."""
+    x, y, z = np.asarray(B, dtype=float)
+    return harmonics(radius, [1, 1, 1], [1, 1, 0], [False, True, False], [-x, -y, -z], kind=INTERIOR)
 
 
 def concatenate(parts: Sequence[Terms]) -> Terms:
     """All sources of all parts: the sum of their fields."""
-    offsets = np.cumsum([0] + [part.coefficient.size for part in parts])
-    starts = [part.start[:-1] + offset for part, offset in zip(parts, offsets, strict=False)]
-    joined = {
-        name: np.concatenate([getattr(part, name) for part in parts])
-        for name in ("kind", "centre", "frame", "radius", "degree", "order", "sine", "coefficient")
-    }
-    return Terms(start=np.concatenate([*starts, offsets[-1:]]).astype(np.int64), **joined)
+    owned = {"start": "coefficient", "node_start": "nodes"}
+    joined: dict[str, Any] = {}
+    for start, array in owned.items():
+        offsets = np.cumsum([0] + [len(getattr(part, array)) for part in parts])
+        starts = [getattr(part, start)[:-1] + offset for part, offset in zip(parts, offsets, strict=False)]
+        joined[start] = np.concatenate([*starts, offsets[-1:]]).astype(np.int64)
+    names = ("kind", "centre", "frame", "radius", "degree", "order", "sine", "coefficient", "nodes")
+    joined |= {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
+    return Terms(**joined)
 
 
 def frame_about(direction: Floats, azimuth: Floats | None = None) -> Floats:
@@ -172,114 +344,3 @@ def frame_about(direction: Floats, azimuth: Floats | None = None) -> Floats:
     x = towards - (towards @ z) * z
     x /= np.linalg.norm(x)
     return np.stack([x, np.cross(z, x), z], axis=1)
-
-
-def _of_degree_one(terms: Terms, run: slice) -> Floats:
-    """Coefficients of degree one, zero elsewhere: the dipole part of a run."""
-    return np.where(terms.degree[run] == 1, terms.coefficient[run], 0.0)
-
-
-def _complex_coefficients(terms: Terms) -> Complexes:
-    """C_lm of every coefficient (c,); loops take no part."""
-    owner = np.repeat(np.arange(terms.kind.size), np.diff(terms.start))
-    scale = np.array([schmidt_scale(n, m) for n, m in zip(terms.degree.tolist(), terms.order.tolist(), strict=True)])
-    part = np.where(terms.sine == 1, -1j, 1.0)
-    complexes: Complexes = terms.radius[owner] * scale * part * terms.coefficient
-    return complexes
-
-
-@kernel
-def _evaluate(
-    points: Points,
-    kind: Integers,
-    centre: Points,
-    frame: Floats,
-    radius: Floats,
-    start: Integers,
-    degree: Integers,
-    harmonic_order: Integers,
-    current: Floats,
-    coefficients: Complexes,
-    order: int,
-    B: Floats,
-    gradient: Floats,
-    hessian: Floats,
-) -> None:
-    """Sum all sources at all points; sources that follow each other in one frame are rotated together."""
-    size = 0 if degree.size == 0 else degree.max() + 5
-    table = np.empty((size, size), dtype=np.complex128)
-    local = np.zeros(15)
-    total = np.zeros(15)
-    work = np.zeros((3, 3, 3))
-    half = np.zeros((3, 3, 3))
-    for i in range(points.shape[0]):
-        total[:] = 0.0
-        local[:] = 0.0
-        for k in range(kind.size):
-            dx = points[i, 0] - centre[k, 0]
-            dy = points[i, 1] - centre[k, 1]
-            dz = points[i, 2] - centre[k, 2]
-            f = frame[k]
-            x = f[0, 0] * dx + f[1, 0] * dy + f[2, 0] * dz
-            y = f[0, 1] * dx + f[1, 1] * dy + f[2, 1] * dz
-            z = f[0, 2] * dx + f[1, 2] * dy + f[2, 2] * dz
-            a, b = start[k], start[k + 1]
-            if kind[k] == LOOP:
-                add_loop(x, y, z, radius[k], current[a], order, local)
-            else:
-                add_harmonics(
-                    x,
-                    y,
-                    z,
-                    radius[k],
-                    degree[a:b],
-                    harmonic_order[a:b],
-                    coefficients[a:b],
-                    order,
-                    table,
-                    local,
-                )
-            if k + 1 == kind.size or not _same_frame(frame, k, k + 1):
-                _add_rotated(f, local, order, work, half, total)
-                local[:] = 0.0
-        B[i, 0], B[i, 1], B[i, 2] = total[0], total[1], total[2]
-        if order > 0:
-            unpack_gradient(total, gradient[i])
-        if order > 1:
-            unpack_hessian(total, hessian[i])
-
-
-@kernel
-def _same_frame(frame: Floats, k: int, other: int) -> bool:
-    for i in range(3):
-        for j in range(3):
-            if frame[k, i, j] != frame[other, i, j]:
-                return False
-    return True
-
-
-@kernel
-def _add_rotated(f: Floats, local: Floats, order: int, work: Floats, half: Floats, total: Floats) -> None:
-    """Add a jet of the frame f (columns: its axes) to `total`, turned into the common frame."""
-    if f[0, 0] == 1.0 and f[1, 1] == 1.0 and f[2, 2] == 1.0:
-        for i in range(3 if order == 0 else 8 if order == 1 else 15):
-            total[i] += local[i]
-        return
-    for i in range(3):
-        total[i] += f[i, 0] * local[0] + f[i, 1] * local[1] + f[i, 2] * local[2]
-    if order > 0:
-        unpack_gradient(local, work[0])
-        for i in range(2):
-            for b in range(3):
-                half[0, i, b] = f[i, 0] * work[0, 0, b] + f[i, 1] * work[0, 1, b] + f[i, 2] * work[0, 2, b]
-        for n, (i, j) in enumerate(((0, 0), (0, 1), (0, 2), (1, 1), (1, 2))):
-            total[3 + n] += f[j, 0] * half[0, i, 0] + f[j, 1] * half[0, i, 1] + f[j, 2] * half[0, i, 2]
-    if order > 1:
-        unpack_hessian(local, work)
-        for n, (i, j, k) in enumerate(((0, 0, 0), (0, 0, 1), (0, 0, 2), (0, 1, 1), (0, 1, 2), (1, 1, 1), (1, 1, 2))):
-            value = 0.0
-            for a in range(3):
-                for b in range(3):
-                    for c in range(3):
-                        value += f[i, a] * f[j, b] * f[k, c] * work[a, b, c]
-            total[8 + n] += value

@@ -17,9 +17,10 @@ from magfem.fields.field import Field
 from magfem.fields.norms import relative_errors
 from magfem.fields.region import Everywhere, Shell
 from magfem.fields.terms import Terms
+from magfem.fields.terms_json import terms_to_list
 from magfem.fitting.families import FAMILIES, Candidate, dissertation_families, family_of
 from magfem.fitting.least_squares import LeastSquares, solve_least_squares
-from magfem.fitting.model import FieldModel, terms_to_list
+from magfem.fitting.model import FieldModel
 from magfem.fitting.recipe import Recipe, fittable
 from magfem.geometry import Coil, Geometry, Magnets
 from magfem.typing import Booleans, Floats, Points

@@ -11,8 +11,8 @@ from magfem.closed_form import exact
 from magfem.errors import InputError
 from magfem.fields import Everywhere, Field
 from magfem.fields.terms import Terms
+from magfem.fields.terms_json import terms_from_list
 from magfem.fitting.families import dissertation_families
-from magfem.fitting.model import terms_from_list
 from magfem.geometry import Magnets
 from magfem.report.figures import (
     Contender,

@@ -10,7 +10,9 @@ import pytest
 import magfem
 from magfem.errors import InputError
 from magfem.fields.norms import relative_errors
-from magfem.fields.terms import LOOP, harmonics
+from magfem.fields.term_kinds import LOOP
+from magfem.fields.terms import harmonics
+from magfem.fields.terms_json import terms_from_list
 from magfem.fitting.families import (
     FAMILIES,
     axial_multipole,
@@ -21,7 +23,6 @@ from magfem.fitting.families import (
     wall_and_face_loops,
 )
 from magfem.fitting.least_squares import solve_least_squares
-from magfem.fitting.model import terms_from_list
 from magfem.geometry import AXIAL, CylinderMagnet, PermanentMagnet
 from magfem.typing import Floats, Points
 

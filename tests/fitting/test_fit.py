@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform
@@ -49,7 +51,7 @@ def largest(found: Floats, truth: Floats) -> float:
 
 
 def same_bits(a, b) -> bool:
-    return all(np.array_equal(getattr(a, key), getattr(b, key)) for key in vars(a))
+    return all(np.array_equal(getattr(a, field.name), getattr(b, field.name)) for field in fields(a))
 
 
 # The accuracy that is asked of every model

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import json
 import re
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +14,8 @@ import pytest
 import magfem
 from magfem.errors import CardError, InputError, OutsideRegionError
 from magfem.fields.terms import concatenate, harmonics, loops
+from magfem.fields.terms_json import terms_from_list, terms_to_list
 from magfem.fitting import Recipe, load_model, load_recipe
-from magfem.fitting.model import terms_from_list, terms_to_list
 
 
 @pytest.fixture(scope="session")
@@ -75,7 +76,7 @@ def test_any_terms_come_back_to_the_bit():
         ]
     )
     again = terms_from_list(json.loads(json.dumps(terms_to_list(terms))))
-    for key, value in vars(terms).items():
+    for key, value in ((field.name, getattr(terms, field.name)) for field in fields(terms)):
         np.testing.assert_array_equal(getattr(again, key), value)
 
 
