@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from magfem.fields.terms import Terms
 
 Unit: TypeAlias = Literal["T", "T/A"]
+OUTSIDE = ("raise", "nan", "extrapolate")
 
 
 @runtime_checkable
@@ -70,7 +71,7 @@ class Evaluated(ABC):
         if order not in (0, 1, 2):
             raise InputError(f"order must be 0, 1 or 2, got {order!r}")
         array = as_points(points)
-        if array.ndim == 1 and (outside == "extrapolate" or self.region.contains(array)):
+        if array.ndim == 1 and outside in OUTSIDE and (outside == "extrapolate" or self.region.contains(array)):
             return tuple(part[0] for part in self.evaluate(array[None], order))  # one point, the short way
         flat = array.reshape(-1, 3)
         promised = promised_points(flat, self.region, outside)
@@ -255,7 +256,7 @@ def as_points(points: ArrayLike) -> Points:
 
 def promised_points(points: Points, region: Region, outside: Outside) -> Booleans:
     """Which of `points` (n, 3) get a value: all for "extrapolate", those of the region for "nan"."""
-    if outside not in ("raise", "nan", "extrapolate"):
+    if outside not in OUTSIDE:
         raise InputError(f'outside must be "raise", "nan" or "extrapolate", got {outside!r}')
     everything = np.ones(points.shape[0], dtype=bool)
     if outside == "extrapolate" or not points.size:
