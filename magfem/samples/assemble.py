@@ -136,7 +136,7 @@ def _unit(source: Source, field: Sequence[Column | None], deviations: Sequence[C
 
 def _measured_rows(source: Source, B: Floats, outside: Literal["raise", "drop"]) -> Booleans:
     """Which rows (n,) hold a component of B."""
-    kept: Booleans = ~np.isnan(B).all(axis=1, keepdims=True)[:, 0]
+    kept: Booleans = np.asarray(~np.isnan(B).all(axis=1))
     if kept.all():
         return kept
     first = int(np.flatnonzero(~kept)[0])

@@ -37,7 +37,9 @@ class Samples:
         points, B = _rows("points", self.points), _rows("B", self.B)
         _same_count(points, B)
         _refuse(np.isinf(B), "B must be finite, or NaN where it was not measured")
-        _refuse(np.isnan(B).all(axis=1, keepdims=True), "no component of B was measured: one at least is needed")
+        _refuse(
+            np.asarray(np.isnan(B).all(axis=1, keepdims=True)), "no component of B was measured: one at least is needed"
+        )
         if self.unit not in ("T", "T/A"):
             raise InputError(f'the unit of samples must be "T" or "T/A", got {self.unit!r}')
         _keep(self, points=points, B=B, sigma=_deviations(self.sigma, B))

@@ -175,7 +175,7 @@ def is_number(cell: str) -> bool:
 
 def table_text(header: Sequence[str], values: Sequence[Floats]) -> str:
     """CSV of arrays (n, …) side by side under a header; every bit is kept."""
-    rows = np.hstack([array.reshape(len(array), -1) for array in values])
+    rows = np.hstack([array.reshape(len(array), math.prod(array.shape[1:])) for array in values])
     lines = [",".join(map(repr, row)) for row in rows.tolist()]
     return "\n".join([",".join(header), *lines, ""])
 
