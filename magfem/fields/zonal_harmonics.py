@@ -12,6 +12,10 @@ and their derivatives are sums of Q_{l+2}^1, Q_{l+2}^2, Q_{l+3}^2, Q_{l+3}^3. Ea
 Nothing in this asks z to be real. At z − i the centre lies at an imaginary height and the point's singularity becomes
 that of a disc of radius a (oblate harmonics; the idea of complex source points is Deschamps', Electron. Lett. 7, 684
 (1971)). The real part of Σ C_l Q_l, C_l complex, is harmonic everywhere off the disc; one kernel serves both.
+
+Measured against 100-digit arithmetic, single degrees, on the axis, near the disc and out to 100 radii: relative error
+of B, gradient and hessian 1e-14 to degree 10, 2e-13 to degree 80 (oblate 4e-13); d radii from a disc's rim
+1e-16 (l + 1)/d. Degree 80 overflows where d < 0.01.
 """
 
 from __future__ import annotations
