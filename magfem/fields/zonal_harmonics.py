@@ -65,7 +65,7 @@ def add_oblate(
 ) -> None:
     """Add the jets of an axial multipole at the imaginary height i·radius, a disc's; as `add_zonal`, but complex.
 
-    The disc's two sides differ: z = 0 inside it counts as its upper side. Infinite on its rim.
+    The disc's two sides differ: z = 0 inside it counts as its upper side. Infinite or NaN on its rim.
     """
     work = np.empty((17, BLOCK), dtype=np.complex128)
     profile = np.empty((6, BLOCK))
@@ -83,8 +83,10 @@ def add_oblate(
             if imaginary <= 0.0:
                 r_imaginary = -r_imaginary
             r_real = 0.5 * imaginary / r_imaginary
-        inverse = 1.0 / complex(real, imaginary)
-        root = 1.0 / complex(r_real, r_imaginary)
+        # Real divisions alone: complex ones raise on the rim, where the field is infinite or NaN.
+        per_size = 1.0 / size
+        root = complex(r_real * per_size, -r_imaginary * per_size)
+        inverse = complex(real * per_size * per_size, -imaginary * per_size * per_size)
         work[_RISE, j] = complex(height, -1.0) * inverse
         work[_INVERSE, j] = inverse
         work[_DIAGONAL, j] = root * inverse
