@@ -24,6 +24,8 @@ _PUBLIC = {
     "fit": "magfem.fitting",
     "load_model": "magfem.fitting",
     "FieldModel": "magfem.fitting",
+    "load_system": "magfem.actuation",
+    "CoilSystem": "magfem.actuation",
     "exact": "magfem.closed_form",
     "validate": "magfem.fitting",
     "Field": "magfem.fields",
@@ -32,6 +34,7 @@ _PUBLIC = {
 }
 
 __all__ = [
+    "CoilSystem",
     "Field",
     "FieldModel",
     "MagfemError",
@@ -43,11 +46,13 @@ __all__ = [
     "load_geometry",
     "load_model",
     "load_solution",
+    "load_system",
     "solve",
     "validate",
 ]
 
 if TYPE_CHECKING:
+    from magfem.actuation import CoilSystem, load_system
     from magfem.closed_form import exact
     from magfem.errors import MagfemError
     from magfem.fem import Solution, load_solution, solve

@@ -13,6 +13,7 @@ from magfem.cli.parser import CommandLine
 
 SECTIONS = (
     ("cards", "device cards", "geometries", ".toml"),
+    ("systems", "coil systems", "geometries/systems", ".toml"),
     ("models", "field models", "fits", ".json"),
     ("recipes", "fit recipes", "fits", ".toml"),
     ("reports", "report recipes", "reports", ".toml"),
@@ -25,9 +26,9 @@ def add(commands: CommandLine) -> None:
     commands.add(
         "list",
         run,
-        "cards, fitted models and recipes it knows",
-        "Lists the names that other commands understand: device cards, fitted field models and recipes, each\n"
-        "with its description.",
+        "cards, coil systems, fitted models and recipes it knows",
+        "Lists the names that other commands understand: device cards, coil systems, fitted field models and\n"
+        "recipes, each with its description.",
         ["magfem list", "magfem list --json"],
     )
 

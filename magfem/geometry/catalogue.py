@@ -17,6 +17,7 @@ _PACKAGE = Path(__file__).parents[1]
 
 _NOUNS = {
     ("geometries", ".toml"): "device card",
+    ("geometries/systems", ".toml"): "coil system",
     ("fits", ".toml"): "fit recipe",
     ("fits", ".json"): "field model",
     ("reports", ".toml"): "report recipe",
