@@ -31,6 +31,7 @@ class Dimension:
 DIMENSIONS: dict[str, Dimension] = {
     "length": Dimension("length", "m", "4 mm"),
     "flux density": Dimension("flux density", "T", "1.35 T"),
+    "flux density per current": Dimension("flux density per current", "T/A", "2 mT/A"),
     # To pint an angle is a bare number, and so are percent and m/m: the units are named instead.
     "angle": Dimension(
         "angle",

@@ -326,7 +326,7 @@ def test_bad_input_is_one_line(words: str, fragment: str, here: Path, capsys: py
             b"x,y\n1,2\n",
             'column z is missing: expected the header x,y,z (m) or x_mm,y_mm,z_mm, got "x,y" [p.csv: line 1]',
         ),
-        (b"x;y;z\n1;2;3\n", 'got "x;y;z" [p.csv: line 1]'),
+        (b"x y z\n1 2 3\n", 'got "x y z" [p.csv: line 1]'),
         (b"x,y,z,x_mm\n1,2,3,4\n", 'column x is there 2 times: "x", "x_mm" [p.csv: line 1]'),
         (b"x_kg,y,z\n1,2,3\n", 'column "x_kg" does not end in a unit of length such as mm [p.csv: line 1]'),
         (b"x,y,z\n1,2,3\n1,two,3\n", 'expected a finite number, got "two" [p.csv: line 3, column y]'),

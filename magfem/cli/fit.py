@@ -57,7 +57,6 @@ def run(options: Namespace) -> int:
 def _recipe(target: str) -> Recipe:
     """A recipe as it is; a card as a recipe that names the device and nothing else."""
     from magfem.fitting import Recipe, load_recipe
-    from magfem.fitting.recipe import fittable
     from magfem.geometry import load_geometry
     from magfem.geometry.card import read_table
     from magfem.geometry.catalogue import is_path, names
@@ -66,7 +65,7 @@ def _recipe(target: str) -> Recipe:
         is_recipe = "device" in read_table(Path(target), target)
     else:
         is_recipe = target in names("fits", ".toml")
-    return load_recipe(target) if is_recipe else Recipe(geometry=fittable(load_geometry(target)))
+    return load_recipe(target) if is_recipe else Recipe(geometry=load_geometry(target))
 
 
 def _text(model: FieldModel, path: Path) -> str:

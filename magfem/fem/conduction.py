@@ -32,6 +32,8 @@ from magfem.geometry.circuit import FoilTrack, Stations
 from magfem.mesh.lattice import lattice, patches, places_across
 from magfem.typing import Floats
 
+_FINE = 32  # places of an element between which a line of constant ψ is straight
+
 
 @dataclass(frozen=True)
 class SheetConduction:
@@ -54,6 +56,22 @@ class SheetConduction:
     def resistance(self) -> float:
         """Ω, leads included."""
         return 0.5 * (self.bounds[0] + self.bounds[1])
+
+    def places(self, stream: float) -> Floats:
+        """Where the line ψ = `stream` (A, between 0 and 1) crosses the stations: (2n+1,) across, −1 to 1."""
+        m = (self.across.size - 1) // 2
+        local = np.linspace(0.0, 1.0, _FINE, endpoint=False)
+        shapes = np.stack([(1 - local) * (1 - 2 * local), 4 * local * (1 - local), local * (2 * local - 1)], axis=1)
+        triples = 2 * np.arange(m)[:, None] + np.arange(3)
+        psi = np.einsum("qa,nma->nmq", shapes, self.stream[:, triples]).reshape(len(self.stream), -1)
+        psi = np.concatenate([psi, self.stream[:, -1:]], axis=1)
+        across = np.append(np.einsum("qa,ma->mq", shapes, self.across[triples]).ravel(), self.across[-1])
+        after = np.clip(np.sum(psi < stream, axis=1), 1, across.size - 1)
+        row = np.arange(len(psi))
+        low, high = psi[row, after - 1], psi[row, after]
+        share = np.divide(stream - low, high - low, out=np.full_like(low, 0.5), where=high > low)
+        found: Floats = across[after - 1] + share * (across[after] - across[after - 1])
+        return found
 
     def currents(self, thickness: float, layers: int = 2) -> SheetCurrents:
         """The current of 1 A as sheets at Gauss's points of the foil's `thickness` (m).

@@ -9,7 +9,10 @@ loops of current K = σ/µ0 there. With the loop's F and G (see `loop`), per uni
     ∂_z F = −K F_loop,    G = K A_loop/ρ = K (µ₀a²/4π) T(1, 3/2),    ∂_z G = −K G_loop,
 
 and F itself is the disc's solid angle, the third complete elliptic integral (Derby & Olbert, Am. J. Phys. 78, 229
-(2010), whose solenoid it is). Far away on the axis F cancels like (a/z)², four digits at 100 radii.
+(2010), whose solenoid it is). Far away, within ρ < a, F cancels like (a/z)², four digits at 100 radii.
+
+Measured against 100-digit arithmetic, 0.1 to 100 radii: relative error of B 1e-11 (the loss above; 2e-14 where ρ > a),
+gradient 1e-14, hessian 1e-13; d radii from the rim 1e-17/d, 4e-16/d and 2e-15/d².
 """
 
 from __future__ import annotations
@@ -33,8 +36,6 @@ from magfem.fields.loop import (
 )
 from magfem.fields.packing import BLOCK, add_axisymmetric
 from magfem.typing import Floats
-
-_ON_RIM = 1e-9  # |a − ρ|/(a + ρ) below which ρ counts as a
 
 
 @kernel
@@ -78,7 +79,7 @@ def _axial_field(rho: float, z: float, radius: float) -> float:
     gamma = (radius - rho) / (radius + rho)
     kc = sqrt((radius - rho) * (radius - rho) + z * z) / far
     side = 1.0 if z >= 0.0 else -1.0
-    if abs(gamma) < _ON_RIM:
+    if gamma == 0.0:
         return 0.25 * side - z / (2.0 * pi * far) * complete_elliptic(kc * kc)[0]
     edge = radius / (pi * (radius + rho)) * z / far * _third_kind(kc, gamma * gamma, 1.0, gamma)
     return (0.5 * side if gamma > 0.0 else 0.0) - edge

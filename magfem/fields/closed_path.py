@@ -3,6 +3,10 @@
 The formulas are those of `filament`, summed over a chain whose last node joins the first. Only the closed chain's field
 is free of curl, so that its derivatives are symmetric and fifteen numbers hold its jet; every filament alone adds what
 is not symmetric, and the sum around the chain takes it away.
+
+With unit vectors â, b̂ from the two nodes, r_a r_b + r_a·r_b cancels beside the wire like the square of the distance d
+to it; r_a r_b |â + b̂|²/2 is the same number and cancels like d. Measured against 100-digit arithmetic: relative error
+of B, gradient and hessian 3e-14 out to 100 times the path's size, 2e-16 l/d beside a filament of length l.
 """
 
 from __future__ import annotations
@@ -45,7 +49,7 @@ def add_closed_path(
             ax, ay, az, ra = work[0, j], work[1, j], work[2, j], work[3, j]
             bx, by, bz, rb = work[4, j], work[5, j], work[6, j], work[7, j]
             u, v, w = ax + bx, ay + by, az + bz  # ∇S, S the sum of the distances
-            inverse = 0.5 / (ra * rb * (1.0 + ax * bx + ay * by + az * bz))  # 1/(S² − l²)
+            inverse = 1.0 / (ra * rb * (u * u + v * v + w * w))  # 1/(S² − l²)
             g1 = scale * inverse
             out[0, j] += g1 * (v * ez - w * ey)
             out[1, j] += g1 * (w * ex - u * ez)
@@ -56,7 +60,7 @@ def add_closed_path(
             ax, ay, az, ra = work[0, j], work[1, j], work[2, j], work[3, j]
             bx, by, bz, rb = work[4, j], work[5, j], work[6, j], work[7, j]
             u, v, w = ax + bx, ay + by, az + bz
-            inverse = 0.5 / (ra * rb * (1.0 + ax * bx + ay * by + az * bz))
+            inverse = 1.0 / (ra * rb * (u * u + v * v + w * w))
             g1 = scale * inverse
             g2 = -2.0 * (ra + rb) * inverse * g1
             ia, ib = g1 / ra, g1 / rb
@@ -78,7 +82,7 @@ def add_closed_path(
             bx, by, bz, rb = work[4, j], work[5, j], work[6, j], work[7, j]
             u, v, w = ax + bx, ay + by, az + bz
             total = ra + rb
-            inverse = 0.5 / (ra * rb * (1.0 + ax * bx + ay * by + az * bz))
+            inverse = 1.0 / (ra * rb * (u * u + v * v + w * w))
             g1 = scale * inverse
             g2 = -2.0 * total * inverse * g1
             g3 = (8.0 * total * total * inverse - 2.0) * inverse * g1

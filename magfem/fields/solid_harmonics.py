@@ -15,6 +15,9 @@ Both are closed under differentiation: with d = +1 outside and −1 inside, J_l^
 
 and zero where the order would exceed the degree: field, gradient and hessian are sums over one table. A set of order 0
 or 1 alone is faster in real numbers, `zonal_harmonics` and `transverse_harmonics`.
+
+Measured against 100-digit arithmetic, single harmonics: relative error of B, gradient and hessian 6e-15 to degree 10,
+2e-13 to degree 80; interior 1e-15 and 1e-14.
 """
 
 from __future__ import annotations

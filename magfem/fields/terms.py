@@ -84,6 +84,15 @@ class Terms:
         rotation = pose.rotation.as_matrix()
         return replace(self, centre=pose.apply(self.centre), frame=rotation @ self.frame)
 
+    def without_zeros(self) -> Terms:
+        """The same field without the sources whose coefficients are all zero; one source stays."""
+        alive = np.zeros(self.kind.size, dtype=bool)
+        alive[self.owner[self.coefficient != 0.0]] = True
+        if alive.all():
+            return self
+        kept = np.flatnonzero(alive)
+        return concatenate([self.source(int(k)) for k in kept]) if kept.size else self.source(0)
+
     def source(self, k: int) -> Terms:
         """Source `k` alone."""
         own, nodes = slice(self.start[k], self.start[k + 1]), slice(self.node_start[k], self.node_start[k + 1])

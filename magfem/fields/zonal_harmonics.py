@@ -12,6 +12,10 @@ and their derivatives are sums of Q_{l+2}^1, Q_{l+2}^2, Q_{l+3}^2, Q_{l+3}^3. Ea
 Nothing in this asks z to be real. At z − i the centre lies at an imaginary height and the point's singularity becomes
 that of a disc of radius a (oblate harmonics; the idea of complex source points is Deschamps', Electron. Lett. 7, 684
 (1971)). The real part of Σ C_l Q_l, C_l complex, is harmonic everywhere off the disc; one kernel serves both.
+
+Measured against 100-digit arithmetic, single degrees, on the axis, near the disc and out to 100 radii: relative error
+of B, gradient and hessian 1e-14 to degree 10, 2e-13 to degree 80 (oblate 4e-13); d radii from a disc's rim
+1e-16 (l + 1)/d. Degree 80 overflows where d < 0.01.
 """
 
 from __future__ import annotations
@@ -61,7 +65,7 @@ def add_oblate(
 ) -> None:
     """Add the jets of an axial multipole at the imaginary height i·radius, a disc's; as `add_zonal`, but complex.
 
-    The disc's two sides differ: z = 0 inside it counts as its upper side. Infinite on its rim.
+    The disc's two sides differ: z = 0 inside it counts as its upper side. Infinite or NaN on its rim.
     """
     work = np.empty((17, BLOCK), dtype=np.complex128)
     profile = np.empty((6, BLOCK))
@@ -79,8 +83,10 @@ def add_oblate(
             if imaginary <= 0.0:
                 r_imaginary = -r_imaginary
             r_real = 0.5 * imaginary / r_imaginary
-        inverse = 1.0 / complex(real, imaginary)
-        root = 1.0 / complex(r_real, r_imaginary)
+        # Real divisions alone: complex ones raise on the rim, where the field is infinite or NaN.
+        per_size = 1.0 / size
+        root = complex(r_real * per_size, -r_imaginary * per_size)
+        inverse = complex(real * per_size * per_size, -imaginary * per_size * per_size)
         work[_RISE, j] = complex(height, -1.0) * inverse
         work[_INVERSE, j] = inverse
         work[_DIAGONAL, j] = root * inverse

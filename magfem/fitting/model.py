@@ -28,9 +28,9 @@ class FieldModel(Evaluated):
     """A fitted field; a Field in T.
 
     lowered: the terms.  covariance: (p, p) of the free parameters; parameter: (c,) the free parameter behind
-    every coefficient.  region: where it holds.  report: what the fit measured about itself (training,
-    heldout, fem, bound, condition, worst, candidates, comparison).  provenance: device with its card, solver
-    settings, versions, date.
+    every coefficient, share: (c,) what the coefficient is of it.  region: where it holds.  report: what the fit
+    measured about itself (training, heldout, fem, bound, condition, worst, candidates, comparison).  provenance:
+    device with its card, solver settings, versions, date.
     """
 
     name: str
@@ -41,6 +41,7 @@ class FieldModel(Evaluated):
     report: dict[str, Any]
     provenance: dict[str, Any]
     unit: Unit = "T"
+    share: Floats | None = None  # None: ones
 
     def __repr__(self) -> str:
         bound, label = self.report["bound"], self.report.get("label", f"{self.lowered.kind.size} sources")
@@ -56,6 +57,11 @@ class FieldModel(Evaluated):
     def moment(self) -> Floats:
         """Magnetic dipole moment (3,) A·m²."""
         return self.lowered.moment
+
+    @property
+    def _shares(self) -> Floats | None:
+        """The shares where they are not all one."""
+        return None if self.share is None or np.all(self.share == 1.0) else self.share
 
     @cached_property
     def terms(self) -> tuple[dict[str, Any], ...]:
@@ -75,6 +81,7 @@ class FieldModel(Evaluated):
             "unit": self.unit,
             "terms": list(self.terms),
             "parameter": [int(index) for index in self.parameter],
+            **({} if self._shares is None else {"share": self._shares.tolist()}),
             "covariance": np.asarray(self.covariance).tolist(),
             "region": region_to_dict(self.region),
             "report": self.report,
@@ -115,6 +122,10 @@ def load_model(name_or_path: str | Path) -> FieldModel:
         parameter = np.array(data["parameter"])
         if parameter.shape != lowered.coefficient.shape or parameter.dtype.kind != "i" or parameter.min() < 0:
             raise ValueError("one index for each coefficient")
+        key = "share"
+        share = numbers(data["share"]) if "share" in data else None
+        if share is not None and share.shape != parameter.shape:
+            raise ValueError("one number for each coefficient")
         key = "covariance"
         covariance = numbers(data["covariance"])
         if covariance.shape != (parameter.max() + 1,) * 2:
@@ -144,4 +155,5 @@ def load_model(name_or_path: str | Path) -> FieldModel:
         report=data["report"],
         provenance=data["provenance"],
         unit=data["unit"],
+        share=share,
     )

@@ -1,86 +1,140 @@
-"""Fit recipes: which device, which family, how good."""
+"""Fit recipes: which device or which samples, which family, how good."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from magfem.errors import InputError
-from magfem.fitting.families import FAMILIES
-from magfem.geometry import Coil, Geometry, Magnets, load_geometry
+from magfem.fields.region import Shell
+from magfem.fitting.families import FAMILIES, family_of, members
+from magfem.fitting.objective import Objective
+from magfem.geometry import Coil, Geometry, load_geometry
 from magfem.geometry.card import Table, read_table
 from magfem.geometry.catalogue import resolve, short_path
+
+SEARCH = "search"
+"""Instead of a family's name: all families that describe the device."""
+
+_KEYS = ("device", "name", "family", "seed", "circuit", "terms", "region", "target", "solve", "fit")
 
 
 @dataclass(frozen=True)
 class Recipe:
     """What to fit and how well.
 
-    geometry: the device; None takes the source's.  family: a name of `families.FAMILIES`; None takes what
-    suits the device.  target_B, target_gradient: relative errors to stay below.  seed: of the sample points.
-    dimension, resolution: how the command line solves the device first.
+    geometry: the device; None takes the source's.  family: a name of `families.FAMILIES`, or "search" for the best of
+    all that describe the device; None takes what suits it.  options: of the family, by name.  region: where the model
+    must hold; None takes the device's.  circuit: of a coil with several, by name.  target_B, target_gradient: relative
+    errors to stay below; None takes 5e-5 and 5e-4, for closed paths 1e-3 and 1e-2.  objective: "layers" (B and
+    gradient, near and far alike), "absolute" (B in T, 2.8) or "relative" (every point of B against itself, 5.3).
+    most_parameters: None for no limit.  seed: of the sample points.  dimension, resolution: how the command line solves
+    the device first.  name: the model's; None takes the device's.
     """
 
-    geometry: Magnets | None = None
+    geometry: Geometry | None = None
     family: str | None = None
-    target_B: float = 5e-4
-    target_gradient: float = 5e-3
+    options: Mapping[str, Any] = field(default_factory=dict)
+    region: Shell | None = None
+    circuit: str | None = None
+    target_B: float | None = None
+    target_gradient: float | None = None
+    objective: Objective = "layers"
+    most_parameters: int | None = None
     seed: int = 0
     dimension: int | None = None
     resolution: float = 1.0
+    name: str | None = None
 
     def __post_init__(self) -> None:
-        if self.geometry is not None:
-            fittable(self.geometry)
         for key in _RULES:
             if complaint := _complaint(key, getattr(self, key)):
                 raise InputError(f"{complaint}, got {getattr(self, key)!r}")
-        if self.family and self.geometry:
-            next(FAMILIES[self.family](self.geometry))  # refuses a device that the family is not made for
+        if self.circuit is not None and self.geometry is not None:
+            _check_circuit(self.geometry, self.circuit)
+        if self.family and self.family != SEARCH and self.geometry:
+            region = self.region or self.geometry.region
+            next(members(self.family, self.geometry, region, self.family_options(self.family)))
 
+    @property
+    def targets(self) -> dict[str, float]:
+        """Relative errors to stay below, by quantity."""
+        B, gradient = (1e-3, 1e-2) if self.family == "closed_paths" else (5e-5, 5e-4)
+        return {
+            "B": B if self.target_B is None else self.target_B,
+            "gradient": gradient if self.target_gradient is None else self.target_gradient,
+        }
 
-def fittable(geometry: Geometry) -> Magnets:
-    """The device, as one that models are fitted to. Raises InputError for coils."""
-    if isinstance(geometry, Coil):
-        raise InputError(
-            f"{geometry.name}: models of coils are not fitted yet; the solution of magfem.solve is a field itself"
-        )
-    assert isinstance(geometry, Magnets)
-    return geometry
+    def family_options(self, family: str) -> dict[str, Any]:
+        """What the family is called with."""
+        circuit = {"circuit": self.circuit} if family == "closed_paths" and self.circuit else {}
+        return {**self.options, **circuit}
+
+    def of(self, geometry: Geometry) -> Recipe:
+        """The recipe for a device, its region and its family settled."""
+        region, family = self.region or geometry.region, self.family or family_of(geometry)
+        return replace(self, geometry=geometry, region=region, family=family)
 
 
 def load_recipe(name_or_path: str | Path) -> Recipe:
     """A fit recipe of the catalogue by name, or the file at a path. Raises InputError, CardError."""
     where = ("fits", name_or_path, ".toml")
     table = read_table(resolve(*where), short_path(*where))
-    table.only("device", "family", "seed", "target", "solve")
-    values: dict[str, Any] = {"geometry": fittable(load_geometry(_device_path(table, resolve(*where))))}
-    if "family" in table:
-        values["family"] = _checked(table, "family", table.text("family"))
+    table.only(*_KEYS)
+    geometry = load_geometry(_device_path(table, resolve(*where)))
+    values: dict[str, Any] = {"geometry": geometry}
+    for key in ("name", "family", "circuit"):
+        if key in table:
+            values[key] = _checked(table, key, table.text(key))
     if "seed" in table:
         values["seed"] = int(_checked(table, "seed", table.number("seed")))
-    if "target" in table:
-        target = table.table("target")
-        target.only("B", "gradient")
-        for key in target.values:
-            values[f"target_{key}"] = _checked(target, key, target.number(key), f"target_{key}")
-    if "solve" in table:
-        solve = table.table("solve")
-        solve.only("dimension", "resolution")
-        if "dimension" in solve:
-            values["dimension"] = int(_checked(solve, "dimension", solve.number("dimension")))
-        if "resolution" in solve:
-            values["resolution"] = _checked(solve, "resolution", solve.number("resolution"))
-    return Recipe(**values)
+    for name, keys in _TABLES.items():
+        if name in table:
+            part = table.table(name)
+            part.only(*keys)
+            for key, target in keys.items():
+                if key in part:
+                    values[target] = _value(part, key, target)
+    if "terms" in table:
+        values["options"] = dict(table.table("terms").values)
+    if "region" in table:
+        values["region"] = _region(table.table("region"), geometry.region)
+    try:
+        return Recipe(**values)
+    except InputError as error:
+        raise table.error(str(error), "terms" if "option" in str(error) else "family") from None
 
+
+_TABLES = {
+    "target": {"B": "target_B", "gradient": "target_gradient"},
+    "solve": {"dimension": "dimension", "resolution": "resolution"},
+    "fit": {"objective": "objective", "most_parameters": "most_parameters"},
+}
+"""The tables of a recipe file, their keys, and the recipe's fields that these set."""
+
+_WHOLE = ("dimension", "most_parameters")
 
 _RULES: dict[str, tuple[Callable[[Any], bool], str]] = {
-    "family": (lambda value: value is None or value in FAMILIES, f"unknown family; known: {', '.join(FAMILIES)}"),
-    "target_B": (lambda value: 0 < value < 1, "target_B must be a relative error between 0 and 1"),
-    "target_gradient": (lambda value: 0 < value < 1, "target_gradient must be a relative error between 0 and 1"),
+    "family": (
+        lambda value: value is None or value == SEARCH or value in FAMILIES,
+        f"unknown family; known: {SEARCH}, {', '.join(FAMILIES)}",
+    ),
+    "target_B": (lambda value: value is None or 0 < value < 1, "target_B must be a relative error between 0 and 1"),
+    "target_gradient": (
+        lambda value: value is None or 0 < value < 1,
+        "target_gradient must be a relative error between 0 and 1",
+    ),
+    "objective": (
+        lambda value: value in ("layers", "absolute", "relative"),
+        'objective must be "layers", "absolute" or "relative"',
+    ),
+    "most_parameters": (
+        lambda value: value is None or (value >= 1 and value == int(value)),
+        "most_parameters must be a whole number, 1 or more",
+    ),
     "seed": (lambda value: 0 <= value < math.inf and value == int(value), "seed must be a whole number, 0 or more"),
     "dimension": (lambda value: value in (None, 2, 3), "dimension must be 2 or 3"),
     "resolution": (lambda value: 0 < value < math.inf, "resolution must be positive and finite"),
@@ -89,6 +143,8 @@ _RULES: dict[str, tuple[Callable[[Any], bool], str]] = {
 
 def _complaint(key: str, value: Any) -> str:
     """What is wrong with a recipe's value; empty when nothing is."""
+    if key not in _RULES:
+        return ""
     holds, sentence = _RULES[key]
     return "" if holds(value) else sentence
 
@@ -98,6 +154,40 @@ def _checked(table: Table, key: str, value: Any, field: str = "") -> Any:
     if complaint := _complaint(field or key, value):
         raise table.error(complaint, key)
     return value
+
+
+def _value(table: Table, key: str, target: str) -> Any:
+    if target == "objective":
+        return _checked(table, key, table.text(key), target)
+    number = _checked(table, key, table.number(key), target)
+    return int(number) if target in _WHOLE else number
+
+
+def _region(table: Table, device: Shell) -> Shell:
+    """The device's region with the limits that the recipe states: clearance, extent, and pairs of z and rho."""
+    table.only("clearance", "extent", "z", "rho")
+    limits: dict[str, Any] = {}
+    for key in ("clearance", "extent"):
+        if key in table:
+            limits[key] = table.quantity(key, "length")
+    for key in ("z", "rho"):
+        if key in table:
+            pair = table.value(key)
+            if not isinstance(pair, list) or len(pair) not in (1, 2):
+                raise table.error(f'{key} must be one or two lengths, such as ["1 mm", "6 mm"]', key)
+            low, *high = [Table(table.origin, {key: text}, table.path).quantity(key, "length") for text in pair]
+            limits[key] = (low, high[0] if high else math.inf)
+    region = replace(device, **limits)
+    if not (region.clearance < region.extent and region.z[0] < region.z[1] and 0 <= region.rho[0] < region.rho[1]):
+        raise table.error("lower limits must be smaller than upper ones, and rho not negative")
+    return region
+
+
+def _check_circuit(geometry: Geometry, name: str) -> None:
+    known = [circuit.name for circuit in geometry.circuits] if isinstance(geometry, Coil) else []
+    if name not in known:
+        has = f"it has {', '.join(known)}" if known else "it is no coil"
+        raise InputError(f"{geometry.name} has no circuit {name!r}; {has}")
 
 
 def _device_path(table: Table, recipe: Path) -> str | Path:

@@ -123,7 +123,8 @@ def _rivals(subject: Subject) -> list[Rival]:
     geometry, entries = subject.geometry, subject.model.report.get("comparison", [])
     if geometry is None:
         return []
-    windows = {one.window.describe(): one.window for one in dissertation_families(geometry) if one.window}
+    families = dissertation_families(geometry, subject.model.region)
+    windows = {one.window.describe(): one.window for one in families if one.window}
     rivals = []
     for entry in entries:
         window = windows.get(entry["window"], Everywhere())

@@ -239,14 +239,16 @@ def test_whole_recipe_is_read(tmp_path):
         resolution = 0.5
     """
     device = magfem.load_geometry("ring_magnet_4x1.5x1")
-    expected = Recipe(device, "wall_and_face_loops", 1e-3, 2e-2, 5, 3, 0.5)
+    expected = Recipe(
+        device, "wall_and_face_loops", target_B=1e-3, target_gradient=2e-2, seed=5, dimension=3, resolution=0.5
+    )
     assert load_recipe(recipe(tmp_path, text)) == expected
 
 
 def test_short_recipe_takes_what_suits_the_device(tmp_path):
     found = load_recipe(recipe(tmp_path, 'device = "rotor_1x3"'))
     assert found == Recipe(geometry=magfem.load_geometry("rotor_1x3"))
-    assert (found.target_B, found.target_gradient) == (5e-4, 5e-3)
+    assert found.targets == {"B": 5e-5, "gradient": 5e-4}
 
 
 def test_device_may_be_a_card_beside_the_recipe(tmp_path, monkeypatch):
@@ -273,7 +275,7 @@ HEAD = 'device = "rotor_1x3"\n'
         ("device = 3", "device must be a text", "device"),
         ('device = ""', "must not be blank", "device"),
         (HEAD + "sed = 3", 'did you mean "seed"', "sed"),
-        (HEAD + 'family = "loops"', "unknown family; known: wall_and_face_loops, solid_harmonics", "family"),
+        (HEAD + 'family = "loops"', "unknown family; known: search, wall_and_face_loops", "family"),
         (HEAD + "family = 3", "family must be a text", "family"),
         (HEAD + 'seed = "0"', "seed must be a bare number", "seed"),
         (HEAD + "seed = -1", "seed must be a whole number", "seed"),
