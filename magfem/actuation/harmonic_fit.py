@@ -122,8 +122,7 @@ def _points(region: Region, rng: np.random.Generator, count: int) -> Points:
     if isinstance(region, Ball | Box):
         return region.random_points(rng, count)
     if isinstance(region, Shell):
-        nearest = np.full(count // 90, region.clearance)  # there errors are largest, and local
-        return np.concatenate([region.layers(rng, count // 45, 30), region.hull.marked_points(nearest, 30, rng)])
+        return region.layers(rng, count // 45, 30, nearest=count // 90)
     raise InputError(f"harmonics are fitted in a Ball, a Box or a shell about a body, not {region.describe()}")
 
 
