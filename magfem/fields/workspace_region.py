@@ -37,7 +37,7 @@ class Ball:
         return f"within {_mm(self.radius)} mm of {_place(self.centre)}"
 
     def random_points(self, rng: np.random.Generator, count: int) -> Points:
-        """Points (count, 3) m, half uniform over the volume, half over its surface, where harmonic errors are largest."""
+        """Points (count, 3) m, half uniform over the volume, half over its surface, where errors are largest."""
         direction = rng.normal(size=(count, 3))
         direction /= np.linalg.norm(direction, axis=1, keepdims=True)
         share = np.cbrt(rng.random(count))
