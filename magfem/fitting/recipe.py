@@ -10,14 +10,16 @@ from typing import Any
 
 from magfem.errors import InputError
 from magfem.fields.region import Shell
-from magfem.fitting.families import FAMILIES, family_of, members
+from magfem.fitting.families import FAMILIES, SAMPLE_FAMILIES, family_of, members
+from magfem.fitting.least_squares import Ridge
+from magfem.fitting.measurement import Loss, Weighting
 from magfem.fitting.objective import Objective
 from magfem.geometry import Coil, Geometry, load_geometry
 from magfem.geometry.card import Table, read_table
 from magfem.geometry.catalogue import resolve, short_path
 
-SEARCH = "search"
-"""Instead of a family's name: all families that describe the device."""
+SEARCH, DEVICE = "search", "device"
+"""Instead of a family's name: all families that describe the device; for samples, the device's own field, scaled."""
 
 _KEYS = ("device", "name", "family", "seed", "circuit", "terms", "region", "target", "solve", "fit")
 
@@ -33,6 +35,11 @@ class Recipe:
     gradient, near and far alike), "absolute" (B in T, 2.8) or "relative" (every point of B against itself, 5.3).
     most_parameters: None for no limit.  seed: of the sample points.  dimension, resolution: how the command line solves
     the device first.  name: the model's; None takes the device's.
+
+    For samples: weighting "sigma", "absolute" or "relative" (None: by what they state); ridge "none", "evidence" (the
+    default) or "leave-one-out"; loss "squares" or "huber"; heldout "samples" or "regions" (None: by their number);
+    background, a static field to be found as well; free, the parameters of `alignment.NAMES` that are free, with
+    bounds or None for sensible ones.
     """
 
     geometry: Geometry | None = None
@@ -48,6 +55,12 @@ class Recipe:
     dimension: int | None = None
     resolution: float = 1.0
     name: str | None = None
+    weighting: Weighting | None = None
+    ridge: Ridge | None = None
+    loss: Loss = "squares"
+    heldout: str | None = None
+    background: bool = False
+    free: Mapping[str, tuple[float, float] | None] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for key in _RULES:
@@ -55,7 +68,7 @@ class Recipe:
                 raise InputError(f"{complaint}, got {getattr(self, key)!r}")
         if self.circuit is not None and self.geometry is not None:
             _check_circuit(self.geometry, self.circuit)
-        if self.family and self.family != SEARCH and self.geometry:
+        if self.family in FAMILIES and self.geometry:
             region = self.region or self.geometry.region
             next(members(self.family, self.geometry, region, self.family_options(self.family)))
 
@@ -119,8 +132,8 @@ _WHOLE = ("dimension", "most_parameters")
 
 _RULES: dict[str, tuple[Callable[[Any], bool], str]] = {
     "family": (
-        lambda value: value is None or value == SEARCH or value in FAMILIES,
-        f"unknown family; known: {SEARCH}, {', '.join(FAMILIES)}",
+        lambda value: value in (None, SEARCH, DEVICE) or value in FAMILIES or value in SAMPLE_FAMILIES,
+        f"unknown family; known: {SEARCH}, {', '.join(FAMILIES)}; for samples {DEVICE}, {', '.join(SAMPLE_FAMILIES)}",
     ),
     "target_B": (lambda value: value is None or 0 < value < 1, "target_B must be a relative error between 0 and 1"),
     "target_gradient": (
@@ -131,6 +144,16 @@ _RULES: dict[str, tuple[Callable[[Any], bool], str]] = {
         lambda value: value in ("layers", "absolute", "relative"),
         'objective must be "layers", "absolute" or "relative"',
     ),
+    "weighting": (
+        lambda value: value in (None, "sigma", "absolute", "relative"),
+        'weighting must be "sigma", "absolute" or "relative"',
+    ),
+    "ridge": (
+        lambda value: value in (None, "none", "evidence", "leave-one-out"),
+        'ridge must be "none", "evidence" or "leave-one-out"',
+    ),
+    "loss": (lambda value: value in ("squares", "huber"), 'loss must be "squares" or "huber"'),
+    "heldout": (lambda value: value in (None, "samples", "regions"), 'heldout must be "samples" or "regions"'),
     "most_parameters": (
         lambda value: value is None or (value >= 1 and value == int(value)),
         "most_parameters must be a whole number, 1 or more",
