@@ -47,7 +47,7 @@ class Column:
     constant: float = 0.0
 
     def in_si(self, cells: Floats) -> Floats:
-        """The SI values of the column's cells; for 1.1 mm exactly the float 0.0011."""
+        """The SI values of the column's cells. A division by 1000 rounds once, a product with 0.001 twice."""
         if self.index is None:
             return np.full(len(cells), self.constant)
         divisor = round(1 / self.scale) if self.scale < 1 else 0
