@@ -176,7 +176,7 @@ def _own_parts(cell: str) -> tuple[str, str]:
 
 
 def _mapped(named: Named, name: str, text: str, dimensions: Sequence[str]) -> Column:
-    if text.startswith("="):
+    if text.startswith("=") and text not in named.header:
         return _constant(name, text[1:].strip(), dimensions)
     for sign, wanted in ((1.0, text), (-1.0, text[1:].strip() if text.startswith("-") else "")):
         if not wanted:

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from magfem.errors import InputError
 from magfem.samples import Samples, SystemSamples, parse_columns, read_samples
@@ -250,3 +252,68 @@ def test_reading_logs_nothing_when_nothing_is_left_out(file: Path, caplog: pytes
     with caplog.at_level(logging.DEBUG, "magfem"):
         read(file, f"{HEAD}\n1,2,3,4,5,6\n")
     assert caplog.messages == []
+
+
+WORDS = [
+    "x",
+    "y",
+    "z",
+    "Bx",
+    "By",
+    "Bz",
+    "sx",
+    "sigma",
+    "i0",
+    "i1",
+    "_mm",
+    "_mT/A",
+    " [mT]",
+    " (T)",
+    ",",
+    ";",
+    "\t",
+    " ",
+    "  ",
+]
+WORDS += [
+    "\n",
+    "%",
+    "# ",
+    "% Grid\n",
+    "% Data\n",
+    "% Length unit: mm\n",
+    "mf.Bx (T)",
+    " @ t=1",
+    "1",
+    "-2.5e-3",
+    "nan",
+    "inf",
+]
+WORDS += [
+    '"',
+    "0,5",
+    "x,y,z,Bx\n",
+    "1,2,3,4\n",
+    "% x y z mf.Bx (T)\n",
+    "1 2 3 4\n",
+    "r",
+    "=",
+    "-",
+    "\0",
+    "\x85",
+    "\u2028",
+    "٣",
+]
+
+
+@given(text=st.one_of(st.lists(st.sampled_from(WORDS), max_size=30).map("".join), st.text(max_size=40)))
+def test_whatever_a_file_holds_samples_or_one_sentence(text: str, tmp_path_factory: pytest.TempPathFactory) -> None:
+    path = tmp_path_factory.mktemp("samples") / "s.csv"
+    path.write_text(text, encoding="utf-8", errors="replace")
+    for columns in (None, {"y": "=1 mm", "z": "-x", "Bz": "mf.Bx (T)"}):
+        try:
+            samples = read_samples(path, columns)
+        except InputError as error:
+            assert str(path) in str(error) and "\n" not in str(error)
+        else:
+            assert np.isfinite(samples.points).all() and samples.count > 0
