@@ -23,6 +23,7 @@ from magfem.fitting.recipe import SEARCH, Recipe
 from magfem.fitting.sampling import LayeredData, layer_errors, sample, worst_places
 from magfem.fitting.selection import Fitted, choose, climb
 from magfem.geometry import Geometry
+from magfem.samples import Samples
 
 log = logging.getLogger("magfem")
 

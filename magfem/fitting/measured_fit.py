@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-import magfem
 from magfem.errors import ConvergenceError, InputError
+from magfem.fem import solve
 from magfem.fields.region import SampledRegion
 from magfem.fields.terms import Terms
 from magfem.fields.workspace_region import Ball, Box
@@ -109,8 +109,10 @@ def _members(samples: Samples, recipe: Recipe) -> Iterator[Candidate | Displacea
 
 def _device(geometry: Geometry, recipe: Recipe) -> Candidate:
     """The device's own solved and fitted field, with one factor."""
-    solution = magfem.solve(geometry, recipe.dimension, recipe.resolution)
-    model = magfem.fit(solution, Recipe(geometry=geometry, region=recipe.region, circuit=recipe.circuit))
+    from magfem.fitting.fit import fit  # which itself hands samples on to this module
+
+    solution = solve(geometry, recipe.dimension, recipe.resolution)
+    model = fit(solution, Recipe(geometry=geometry, region=recipe.region, circuit=recipe.circuit))
     parameter = np.zeros(model.lowered.coefficient.size, dtype=np.int64)
     return Candidate(DEVICE, f"the device's own field, {model.report['label']}", model.lowered, parameter)
 
@@ -123,11 +125,9 @@ def _predicted(fit: MeasuredFit, heldout: str) -> Floats:
     if heldout == "regions":
         residual = np.empty_like(fit.left_out)
         fold = regions(measurement.samples.points)[point]
-        matrix = measurement.matrix(fit.theta)
         for number in range(fold.max() + 1):
             out = fold == number
-            solved = measurement.solve(fit.theta, fit.weight, ~out)
-            residual[out] = measurement.target[out] - matrix[out] @ solved.parameters
+            residual[out] = fit.solved.without(measurement.target * fit.weight, out) / fit.weight[out]
     squares = np.bincount(point, (fit.weight * residual) ** 2, measurement.samples.count)
     return np.sqrt(squares)
 

@@ -109,13 +109,10 @@ class Measurement:
         """Of a row, where the samples say it."""
         return 1.0 if self.weighting == "sigma" else None
 
-    def solve(self, theta: Floats, weight: Floats, rows: Booleans | None = None) -> LeastSquares:
-        """Linear parameters for nonlinear ones (q,), rows times `weight` (r,); of some `rows` (r,) only."""
-        chosen = slice(None) if rows is None else rows
-        matrix, target = self.matrix(theta)[chosen], self.target[chosen]
-        return solve_least_squares(
-            matrix * weight[chosen, None], target * weight[chosen], self.ridge, self.variance, CONDITION
-        )
+    def solve(self, theta: Floats, weight: Floats) -> LeastSquares:
+        """Linear parameters for nonlinear ones (q,), rows times `weight` (r,)."""
+        matrix, target = self.matrix(theta) * weight[:, None], self.target * weight
+        return solve_least_squares(matrix, target, self.ridge, self.variance, CONDITION)
 
 
 @dataclass(frozen=True)
@@ -154,19 +151,17 @@ _ALIKE = 1e-3
 def solve_measurement(measurement: Measurement) -> MeasuredFit:
     """Fit all parameters; outliers weigh less where the loss says so."""
     weight = np.ones(measurement.target.size)
-    theta = measurement.starts[0]
-    for step in range(20):
-        theta = _project(measurement, weight, measurement.starts if step == 0 else theta[None])
-        solved = measurement.solve(theta, weight)
-        if measurement.loss == "squares":
-            break
-        residual = solved.residual / weight
+    theta = _project(measurement, weight, measurement.starts)
+    for _ in range(20 if measurement.loss == "huber" else 0):
+        residual = measurement.solve(theta, weight).residual / weight
         spread = 1.0 if measurement.variance else max(1.4826 * float(np.median(np.abs(residual))), 1e-300)
         new = np.sqrt(np.minimum(1.0, _HUBER * spread / np.maximum(np.abs(residual), 1e-300)))
         if np.abs(new - weight).max() < 1e-3:
             break
         weight = new
-    return _judged(measurement, theta, measurement.solve(theta, weight), weight)
+        theta = _project(measurement, weight, theta[None])
+    solved = measurement.solve(theta, weight)
+    return _judged(measurement, theta, solved, weight) if measurement.free else _linear(measurement, solved, weight)
 
 
 def _project(measurement: Measurement, weight: Floats, starts: Floats) -> Floats:
@@ -186,6 +181,13 @@ def _project(measurement: Measurement, weight: Floats, starts: Floats) -> Floats
     ]
     best: Floats = min(found, key=lambda one: float(one.cost)).x
     return best
+
+
+def _linear(measurement: Measurement, solved: LeastSquares, weight: Floats) -> MeasuredFit:
+    """Without nonlinear parameters the decomposition of the linear ones says it all."""
+    kept = solved.singular**2 / (solved.singular**2 + solved.ridge)
+    left_out = _left_out(measurement, solved.basis * np.sqrt(kept), solved.residual)
+    return MeasuredFit(measurement, np.empty(0), solved, weight, solved.covariance, (), left_out / weight)
 
 
 def _judged(measurement: Measurement, theta: Floats, solved: LeastSquares, weight: Floats) -> MeasuredFit:
