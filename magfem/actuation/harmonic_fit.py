@@ -1,29 +1,43 @@
 """Any terms as solid harmonics, by a fit in a region: what loops, paths, oblate sources and discs become for others.
 
-They are no finite sums of solid harmonics. Their common field is fitted by least squares at points of the region:
-exterior harmonics at a few centres along the body's axis, of order 0 for a coil of revolution, and, where the region is
-a ball or a box, interior ones about its middle. More and more of them are tried; other points of the region judge.
+They are no finite sums of solid harmonics. Their common field is fitted by least squares at points of the region. Tried
+are, from few to many, until other points of the region are content:
+
+- exterior harmonics at a few centres along the body's axis, of order 0 for a body of revolution, and, where the region
+  is a ball or a box, interior ones about its middle;
+- close to the body, dipoles on rings that fill it. n dipoles around a ring of radius ρ look smooth from a distance d
+  but for a share of e^{−nd/ρ}, so n follows from how near the region comes. For a body of revolution the dipoles of a
+  ring are alike: an axial and a radial amplitude for each ring.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import product
+from math import ceil
 
 import numpy as np
 
 from magfem.errors import InputError
+from magfem.fields.hull import CylinderHull
 from magfem.fields.norms import relative_errors
 from magfem.fields.region import Region, Shell
 from magfem.fields.term_kinds import HARMONIC, INTERIOR, PATH
 from magfem.fields.terms import Terms, concatenate, frame_about, harmonics
 from magfem.fields.workspace_region import Ball, Box, bounding_ball
 from magfem.fitting.least_squares import solve_least_squares
-from magfem.typing import Booleans, Floats, Points
+from magfem.typing import Booleans, Floats, Integers, Points
 
 _OF_REVOLUTION = ((1, 3), (1, 6), (2, 4), (3, 4), (4, 5), (6, 5), (8, 6), (10, 6))
 _GENERAL = ((1, 2), (1, 4), (1, 6), (3, 4), (5, 4))
 """Centres along the axis and highest degree, from few coefficients to many."""
+
+_SPACINGS = (2.5, 1.5, 1.0, 0.7, 0.5)
+"""Of rings, in distances between body and region."""
+
+_SMOOTH = 12.0  # n d/ρ: of the waviness of a ring's n dipoles, e^{−12} remains
+_MOST_SOURCES, _MOST_PARAMETERS = 800, 600
 
 _SEED = 0
 _GOOD_ENOUGH = 0.1  # of the tolerance: what is better is not worth more sources
@@ -59,20 +73,39 @@ def _chosen(terms: Terms, which: Booleans) -> Terms | None:
     return concatenate([terms.source(int(k)) for k in rows]) if rows.size else None
 
 
+@dataclass(frozen=True)
+class _Candidate:
+    """Sources to fit: the parameter (c,) behind every coefficient, which multiplies its value in `terms`."""
+
+    terms: Terms
+    parameter: Integers
+
+    def columns(self, points: Points) -> Floats:
+        """B (p, n, 3) of every parameter at one."""
+        columns = np.zeros((int(self.parameter.max()) + 1, len(points), 3))
+        for k in range(self.terms.kind.size):
+            source, first = self.terms.source(k), int(self.terms.start[k])
+            for j, value in enumerate(source.coefficient):
+                unit = source.with_coefficients(value * (np.arange(source.degree.size) == j))
+                columns[self.parameter[first + j]] += unit.jet(points, 0)[0]
+        return columns
+
+
 def _fitted(rest: Terms, terms: Terms, region: Region, tolerance: float) -> HarmonicFit:
     """Harmonics for `rest`, and the errors they leave of `terms`, of which it is a part."""
     rng = np.random.default_rng(_SEED)
-    training, judged = _points(region, rng, 600), _points(region, rng, 2400)
+    training, judged = _points(region, rng, 1800).reshape(-1, 3), _points(region, rng, 2400)
     whole = terms.jet(judged.reshape(-1, 3), 0)[0].reshape(judged.shape)
     wanted = rest.jet(judged.reshape(-1, 3), 0)[0].reshape(judged.shape)
-    flat = training.reshape(-1, 3)
-    target = rest.jet(flat, 0)[0]
-    weight = 1 / np.maximum(np.linalg.norm(target, axis=1), 1e-2 * np.linalg.norm(target, axis=1).max())
+    target = rest.jet(training, 0)[0]
+    size = np.linalg.norm(target, axis=1, keepdims=True)
+    weight = 1 / np.maximum(size, 1e-2 * size.max())
     best: HarmonicFit | None = None
-    for candidate in _candidates(rest, region):
-        columns = np.stack([_one_column(candidate, flat, k) * weight[:, None] for k in range(candidate.degree.size)])
-        solved = solve_least_squares(columns.reshape(len(columns), -1).T, (target * weight[:, None]).ravel())
-        fitted = candidate.with_coefficients(solved.parameters)
+    for candidate in _candidates(rest, region, training):
+        columns = candidate.columns(training) * weight
+        solved = solve_least_squares(columns.reshape(len(columns), -1).T, (target * weight).ravel())
+        unit = candidate.terms.coefficient
+        fitted = candidate.terms.with_coefficients(unit * solved.parameters[candidate.parameter])
         found = fitted.jet(judged.reshape(-1, 3), 0)[0].reshape(judged.shape)
         errors = relative_errors(whole + found - wanted, whole, layered=judged.ndim == 3)
         tried = HarmonicFit(fitted, float(errors.max()), float(np.sqrt(np.mean(errors**2))))
@@ -84,39 +117,58 @@ def _fitted(rest: Terms, terms: Terms, region: Region, tolerance: float) -> Harm
     return best
 
 
-def _one_column(candidate: Terms, points: Points, k: int) -> Floats:
-    """B (n, 3) of coefficient k at one."""
-    return candidate.with_coefficients(np.arange(candidate.degree.size) == k).jet(points, 0)[0]
-
-
 def _points(region: Region, rng: np.random.Generator, count: int) -> Points:
     """Random points of a region: (n, 3), or (layers, n, 3) with one hull distance each."""
     if isinstance(region, Ball | Box):
         return region.random_points(rng, count)
     if isinstance(region, Shell):
-        return region.layers(rng, count // 30, 30)
+        return region.layers(rng, count // 45, 30, nearest=count // 90)
     raise InputError(f"harmonics are fitted in a Ball, a Box or a shell about a body, not {region.describe()}")
 
 
-def _candidates(rest: Terms, region: Region) -> Iterator[Terms]:
-    """Sets of harmonics to fit, from small to large; none has a centre in the region."""
+def _candidates(rest: Terms, region: Region, points: Points) -> Iterator[_Candidate]:
+    """Sets of harmonics to fit, from small to large; none has a centre in the region, of which `points` are many."""
     body = _body(rest)
     frame = frame_about(body.axis)
-    reach = max(body.half, 0.5 * body.radius)
-    if isinstance(region, Shell):
-        reach = min(reach, body.half + 0.5 * region.clearance)
+    hull = CylinderHull(2 * body.radius, 2 * body.half)
+    away = float(hull.distance((points - body.centre) @ frame).min())
+    reach = min(max(body.half, 0.5 * body.radius), body.half + 0.5 * away)
     inner = bounding_ball(region)
     for count, degree in _OF_REVOLUTION if body.revolved else _GENERAL:
         along = reach * np.cos((np.arange(count) + 0.5) * np.pi / count)  # Chebyshev's points
         places = body.centre + along[:, None] * body.axis
-        parts = [
-            _harmonics(HARMONIC, degree, place, reach, frame, body.revolved)
-            for place in places[~region.contains(places)]
-        ]
+        parts = [_harmonics(HARMONIC, degree, place, reach, frame, body.revolved) for place in places]
         if inner is not None:
             parts.append(_harmonics(INTERIOR, min(degree, 6), np.array(inner.centre), inner.radius, np.eye(3), False))
-        if parts:
-            yield concatenate(parts)
+        terms = concatenate(parts)
+        yield _Candidate(terms, np.arange(terms.degree.size))
+    for spacing in _SPACINGS if away > 0 else ():
+        dipoles = _rings(body, frame, spacing * away, away)
+        if dipoles.terms.kind.size <= _MOST_SOURCES and dipoles.parameter.max() < _MOST_PARAMETERS:
+            yield dipoles
+
+
+def _rings(body: _Body, frame: Floats, spacing: float, away: float) -> _Candidate:
+    """Dipoles on rings about the axis that fill a body, with that spacing, seen from as near as `away`."""
+    inset = min(0.5 * away, 0.5 * body.radius), min(0.5 * away, 0.5 * body.half)
+    width, half = body.radius - inset[0], body.half - inset[1]
+    heights = np.linspace(-half, half, max(1 if half == 0 else 2, round(2 * half / spacing) + 1))
+    radii = np.linspace(0, width, max(2, round(width / spacing) + 1))
+    parts: list[Terms] = []
+    parameter: list[int] = []
+    for ring, (height, radius) in enumerate(product(heights, radii)):
+        distance = away + min(body.radius - radius, body.half - abs(height))
+        count = 1 if radius == 0 else max(4, ceil(_SMOOTH * radius / distance))
+        for azimuth in 2 * np.pi * np.arange(count) / count:
+            radial = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
+            centre = body.centre + frame @ (radius * radial + [0, 0, height])
+            axes = frame_about(body.axis, frame @ radial)
+            free = 3 if not body.revolved else 2 if radius > 0 else 1  # axial, radial, azimuthal
+            sine = [False, False, True][:free]
+            parts.append(harmonics(away, [1] * free, [0, 1, 1][:free], sine, np.ones(free), centre, axes))
+            first = 2 * ring if body.revolved else 3 * len(parts)
+            parameter += range(first, first + free)
+    return _Candidate(concatenate(parts), np.unique(parameter, return_inverse=True)[1])
 
 
 def _harmonics(kind: int, top: int, centre: Points, radius: float, frame: Floats, revolved: bool) -> Terms:

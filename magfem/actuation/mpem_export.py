@@ -61,7 +61,7 @@ def write_mpem(
 
     source: a system; a model in T/A becomes a system of one coil, a field in T a background (`Offset`) without
     coils.  workspace: a Ball or Box where the file is to hold; by default the system's workspace or the model's
-    region. `Workspace_Dimensions` are the box, the cube within the ball, or the cube around a shell about a body.
+    region. `Workspace_Dimensions` are the box, the cube within the ball, or the box around a shell about a body.
     tolerance: of the fit, if one is needed, relative.  strict: whether a larger residual is refused
     (ConvergenceError) or written all the same.
 
@@ -121,7 +121,8 @@ def _box(region: Region) -> Box:
         return Box(tuple(low.tolist()), tuple(high.tolist()))
     if isinstance(region, Shell):
         reach = region.hull.radius + region.extent
-        return Box((-reach,) * 3, (reach,) * 3)
+        side = min(reach, region.rho[1])
+        return Box((-side, -side, max(-reach, region.z[0])), (side, side, min(reach, region.z[1])))
     raise InputError(f"an MPEM file states a workspace: give a Ball or a Box instead of {region.describe()}")
 
 

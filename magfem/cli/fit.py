@@ -39,19 +39,28 @@ def run(options: Namespace) -> int:
     """Solve, fit, write, print the errors."""
     name = Path(options.target).name.removesuffix(".toml")
     path = output_file(options.output or f"{name}.json", [".json"])
-    recipe = _recipe(options.target)
-    from magfem.fem import solve
-    from magfem.fitting import fit
-
-    assert recipe.geometry is not None
-    dimension = recipe.dimension if options.dimension is None else options.dimension
-    resolution = recipe.resolution if options.resolution is None else options.resolution
-    model = fit(solve(recipe.geometry, dimension, resolution), recipe)
+    model = _model(options)
     model.save(path)
     content = model.to_dict()
     data = {key: content[key] for key in ("name", "unit", "region", "report", "provenance")}
     show_result(options, _text(model, path), {"output": str(path), "moment": model.moment, **data})
     return 0
+
+
+def _model(options: Namespace) -> FieldModel:
+    """Solved and fitted, or of coefficients that somebody else published."""
+    from magfem.fem import solve
+    from magfem.fitting import fit
+    from magfem.fitting.published import is_published, load_published
+    from magfem.geometry.catalogue import is_path, names
+
+    if (is_path(options.target, ".toml") or options.target in names("fits", ".toml")) and is_published(options.target):
+        return load_published(options.target)
+    recipe = _recipe(options.target)
+    assert recipe.geometry is not None
+    dimension = recipe.dimension if options.dimension is None else options.dimension
+    resolution = recipe.resolution if options.resolution is None else options.resolution
+    return fit(solve(recipe.geometry, dimension, resolution), recipe)
 
 
 def _recipe(target: str) -> Recipe:
@@ -70,6 +79,16 @@ def _recipe(target: str) -> Recipe:
 
 def _text(model: FieldModel, path: Path) -> str:
     report = model.report
+    if report["family"] == "published":
+        rows = [
+            ("parameters", str(report["parameters"])),
+            ("region", model.region.describe()),
+            ("stated bound", _errors(report["bound"])),
+            ("its ground", report["ground"]),
+            ("moment", moment_text(model.moment)),
+            ("model", str(path)),
+        ]
+        return f"{model.name}: {report['label']}\n{listing(rows)}"
     rows = [
         ("parameters", f"{report['parameters']}, condition {report['condition']:.1e}"),
         ("region", model.region.describe()),

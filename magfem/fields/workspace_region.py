@@ -114,7 +114,11 @@ def surely_holds(region: Region, ball: Ball) -> bool:
         return surely_holds(region.region, Ball((x, y, z), radius))
     if isinstance(region, Shell):
         distance = float(region.hull.distance(centre))
-        return region.clearance <= distance - radius and distance + radius <= region.extent
+        slack, rho = _SLACK * region.extent, float(np.hypot(*centre[:2]))
+        within = region.clearance <= distance - radius + slack and distance + radius - slack <= region.extent
+        within &= region.z[0] <= centre[2] - radius + slack and centre[2] + radius - slack <= region.z[1]
+        within &= rho + radius - slack <= region.rho[1] and (region.rho[0] == 0 or region.rho[0] <= rho - radius)
+        return bool(within)
     if isinstance(region, Ball):
         return math.dist(centre, region.centre) + radius <= region.radius * (1 + _SLACK)
     if isinstance(region, Box):
