@@ -1,4 +1,4 @@
-/* A circular loop about z (Simpson et al., NASA/TM-2013-217919, in the integrals above). */
+/* A circular loop about z (Simpson et al. 2001, in the integrals above). */
 static inline void MODEL_add_loop(const MODEL_source *source, const double x[3], double jet[8])
 {
     const double a = source->radius, s = x[0] * x[0] + x[1] * x[1], z = x[2];
