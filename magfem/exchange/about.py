@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import unicodedata
 from typing import Any
 
 import numpy as np
@@ -59,3 +60,11 @@ def facts(field: Field) -> dict[str, str]:
 def _table(field: Field, name: str) -> dict[str, Any]:
     table = getattr(field, name, None)
     return table if isinstance(table, dict) else {}
+
+
+_SPELT = str.maketrans({"×": "x", "–": "-", "−": "-", "µ": "u", "μ": "u", "·": " ", "’": "'"})
+
+
+def ascii_text(text: str) -> str:
+    """The text in ASCII, for programs that know no other."""
+    return unicodedata.normalize("NFKD", text.translate(_SPELT)).encode("ascii", "replace").decode()

@@ -43,7 +43,8 @@ def c_header(field: Field, name: str = "magnet") -> str:
     field: a fitted model, or placed, scaled and summed ones.  name: a C identifier, the prefix of all that the header
     defines. Numbers keep all their bits. Raises InputError for another name, or a field that has no terms.
     """
-    return _template(c_name(name)).render(_context(field))
+    text: str = _template(c_name(name)).render(_context(field))
+    return text
 
 
 def c_name(name: str) -> str:

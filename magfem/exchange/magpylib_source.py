@@ -52,7 +52,8 @@ def to_magpylib(field: Field, outside: Outside = "nan") -> CustomSource:
         B = model.B(observers, outside=outside)
         return B if field == "B" else B / magpylib.mu_0
 
-    return magpylib.misc.CustomSource(field_func=field_func, style_label=facts(field)["name"])
+    source: CustomSource = magpylib.misc.CustomSource(field_func=field_func, style_label=facts(field)["name"])
+    return source
 
 
 def magpylib_module(field: Field, model: str | os.PathLike[str], path: Path, current: float | None = None) -> str:
@@ -115,17 +116,18 @@ class MagpylibField(Evaluated):
 
     source: Any
     step: float
-    region: Region = Everywhere()
     unit: Unit = "T"
+
+    @property
+    def region(self) -> Region:
+        return Everywhere()
 
     def evaluate(self, points: Points, order: int) -> Jet:
         parts = [self._jet(points[k : k + _AT_A_TIME], order) for k in range(0, len(points), _AT_A_TIME)]
         return tuple(np.concatenate(part) for part in zip(*parts, strict=True))
 
     def _flux_density(self, points: Points) -> Vectors:
-        import magpylib
-
-        B: Vectors = magpylib.getB(self.source, points.reshape(-1, 3), squeeze=False)
+        B: Vectors = _magpylib().getB(self.source, points.reshape(-1, 3), squeeze=False)
         return B.reshape(points.shape)
 
     def _jet(self, points: Points, order: int) -> Jet:

@@ -6,7 +6,6 @@ The layout is documented where its readers look: in the help text of `magfem_fie
 from __future__ import annotations
 
 import io
-import unicodedata
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,7 @@ from typing import Any
 import numpy as np
 from scipy.io import savemat
 
-from magfem.exchange.about import facts, terms_of
+from magfem.exchange.about import ascii_text, facts, terms_of
 from magfem.fields.field import Field
 from magfem.fields.term_kinds import NAMES
 from magfem.files import write_bytes
@@ -60,18 +59,11 @@ def mat_variables(field: Field) -> dict[str, Any]:
         "nodes": terms.nodes,
     }
     return {
-        "name": _ascii(about["name"]),
+        # Octave 7 counts bytes where the format counts letters, and cuts the end of texts beyond ASCII off.
+        "name": ascii_text(about["name"]),
         "unit": field.unit,
-        "region": _ascii(about["region"]),
-        "about": _ascii("\n".join(f"{key}: {text}" for key, text in about.items())),
+        "region": ascii_text(about["region"]),
+        "about": ascii_text("\n".join(f"{key}: {text}" for key, text in about.items())),
         "kind": kind,
         **{key: np.asarray(array, dtype=float) for key, array in plain.items()},
     }
-
-
-_SPELT = str.maketrans({"×": "x", "–": "-", "−": "-", "µ": "u", "μ": "u", "·": " ", "’": "'"})
-
-
-def _ascii(text: str) -> str:
-    """The text in ASCII: Octave 7 counts bytes where the format counts letters, and cuts the end of others off."""
-    return unicodedata.normalize("NFKD", text.translate(_SPELT)).encode("ascii", "replace").decode()
