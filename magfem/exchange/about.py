@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from magfem.errors import InputError
-from magfem.fields.field import Field
+from magfem.fields.field import Field, Placed, Scaled
 from magfem.fields.terms import Terms
 from magfem.units import one_line
 from magfem.version import __version__
@@ -32,9 +32,12 @@ def terms_of(field: Field, target: str) -> Terms:
 
 def facts(field: Field) -> dict[str, str]:
     """Name, unit, region, bound, device, solver and origin of a field, one line each; what is unknown is left out."""
-    report, provenance = _table(field, "report"), _table(field, "provenance")
+    origin: Field = field
+    while isinstance(origin, (Placed, Scaled)):  # relative errors stay what they are
+        origin = origin.field
+    report, provenance = _table(origin, "report"), _table(origin, "provenance")
     found = {
-        "name": getattr(field, "name", None) or "magnetic field",
+        "name": getattr(origin, "name", None) or "magnetic field",
         "unit": f"{field.unit}, gradient in {field.unit}/m",
         "region": field.region.describe(),
     }

@@ -63,7 +63,9 @@ def magpylib_module(field: Field, model: str | os.PathLike[str], path: Path, cur
     a model per ampere, A.
     """
     if field.unit != "T" and current is None:
-        raise UnitMismatchError("magpylib's sources are in T, and this model is per ampere (T/A): say which current")
+        raise UnitMismatchError(
+            "magpylib's sources are in T, and this model is per ampere (T/A): say at which current, in A (--current)"
+        )
     reference = repr(os.fspath(model))
     if is_path(model, ".json"):
         relative = os.path.relpath(os.path.realpath(model), os.path.realpath(path.parent))

@@ -68,6 +68,11 @@ EXPECTED = {
         ("finer.report['heldout']['B']['max'] <= 5e-5", True, 0),
         ("abs(again.B([0, 0, 3e-3]) - solution.B([0, 0, 3e-3])).max()", 0.0, 0.0),
     ],
+    "exchange.md": [
+        ("(B - block.getB((0, 0, 4e-3)))[2]", 0.973 * RIGID, 5e-3),
+        ("gradient[2, 2] / (theirs.B([0, 0, 4.001e-3]) - theirs.B([0, 0, 3.999e-3]))[2] * 2e-6", 1.0, 1e-6),
+        ("grid['B'][grid.find_closest_point((0, 0, 3e-3))][2]", 0.973 * RIGID, 5e-3),
+    ],
 }
 
 

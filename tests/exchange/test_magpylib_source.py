@@ -134,7 +134,7 @@ def test_module_and_model_file_travel_together(tmp_path: Path) -> None:
 
 def test_module_of_a_coil_states_its_current(tmp_path: Path) -> None:
     coil = TermsField(KINDS["loops"], unit="T/A")
-    with pytest.raises(UnitMismatchError, match="which current"):
+    with pytest.raises(UnitMismatchError, match="at which current"):
         magpylib_module(coil, "coil", tmp_path / "coil.py")
     text = magpylib_module(coil, "coil", tmp_path / "coil.py", current=0.5)
     assert "CURRENT = 0.5  # A" in text and "* CURRENT" in text

@@ -2,27 +2,18 @@
 
 from __future__ import annotations
 
-import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
 from exchange.exchanged_fields import FIELDS, KINDS, TermsField, points_of, worst
+from exchange.octave import run_octave
 from scipy.io import loadmat, savemat
 
 import magfem
 from magfem.errors import InputError
 from magfem.exchange import write_mat
 from magfem.fields import Everywhere
-
-
-def run_octave(program: str, script: str, folder: Path) -> str:
-    """What Octave prints when it runs `script` in `folder`; a warning is an error to this."""
-    (folder / "script.m").write_text(script)
-    words = [program, "--no-gui", "--norc", "--no-history", "--quiet", "script.m"]
-    done = subprocess.run(words, cwd=folder, capture_output=True, text=True, timeout=300)
-    assert done.returncode == 0 and not done.stderr, done.stderr
-    return done.stdout
 
 
 @pytest.fixture(scope="module")
