@@ -12,11 +12,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import RigidTransform
 
 from magfem.errors import InputError
 from magfem.exchange.about import ascii_text, facts
-from magfem.exchange.shells import bounding_box, placed_shells
+from magfem.exchange.shells import bounding_box
 from magfem.fields.field import Field, as_points
+from magfem.fields.region import PlacedRegion, Shell
 from magfem.files import write_bytes
 from magfem.typing import ArrayLike, Points
 
@@ -68,10 +70,13 @@ def write_points(field: Field, path: str | Path, points: ArrayLike | None = None
 
 def region_points(field: Field) -> Points:
     """Random points (2560, 3) m of the field's region, the same every time."""
-    shells = placed_shells(field.region)
-    if not shells or len(shells) > 1:
+    region, pose = field.region, RigidTransform.identity()
+    while isinstance(region, PlacedRegion):
+        pose = pose * region.pose
+        region = region.region
+    if not isinstance(region, Shell):
         raise InputError(f"the field's region ({field.region.describe()}) offers no points of its own: say which")
-    points: Points = shells[0].pose.apply(shells[0].shell.layers(np.random.default_rng(_SEED)).reshape(-1, 3))
+    points: Points = pose.apply(region.layers(np.random.default_rng(_SEED)).reshape(-1, 3))
     return points
 
 

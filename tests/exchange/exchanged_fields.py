@@ -14,8 +14,18 @@ from magfem.fields import Evaluated, Shell
 from magfem.fields.field import Field, Unit
 from magfem.fields.hull import BoxHull, CylinderHull
 from magfem.fields.region import Region
-from magfem.fields.term_kinds import INTERIOR, NAMES, OBLATE
-from magfem.fields.terms import Terms, charge_discs, closed_path, concatenate, frame_about, harmonics, loops, uniform
+from magfem.fields.term_kinds import HARMONIC, INTERIOR, NAMES, OBLATE
+from magfem.fields.terms import (
+    HIGHEST_DEGREE,
+    Terms,
+    charge_discs,
+    closed_path,
+    concatenate,
+    frame_about,
+    harmonics,
+    loops,
+    uniform,
+)
 from magfem.typing import Floats, Jet, Points
 
 SHELL = Shell(CylinderHull(diameter=4e-3, length=1e-3), clearance=0.5e-3, extent=6e-3)
@@ -84,6 +94,10 @@ assert set(KINDS["everything"].kind) == set(NAMES)  # a new kind of term must co
 def fields() -> dict[str, Field]:
     """Every kind, placed, scaled and summed ones, and the committed models."""
     terms = {name: TermsField(part, name=name) for name, part in KINDS.items()}
+    top = HIGHEST_DEGREE
+    for kind, name in ((HARMONIC, "exterior"), (INTERIOR, "interior")):
+        highest = harmonics(4e-3, [top] * 3, [0, 1, top], [False, True, True], [0.1, 0.2, 0.3], kind=kind)
+        terms[f"{name} harmonics of the highest degree"] = TermsField(highest)
     box = TermsField(KINDS["uniform"], Shell(BoxHull((2e-3, 3e-3, 1e-3)), 0.5e-3, 9e-3))
     composed = terms["everything"].at(POSE) * -0.5 + box
     committed = {name: magfem.load_model(name) for name in ("ring_magnet_4x1.5x1", "rotor_1x3")}

@@ -103,6 +103,12 @@ def test_points_of_the_region(ring: Field, tmp_path: Path) -> None:
     assert np.all(array(data, "inside") == 1)
 
 
+def test_points_of_a_placed_region_are_its_own(tmp_path: Path) -> None:
+    placed = TermsField(KINDS["loops"]).at(POSE)
+    points = write_points(placed, tmp_path / "placed.vtu")
+    assert placed.region.contains(points).all() and not SHELL.contains(points).all()
+
+
 def test_points_of_a_users_own(ring: Field, tmp_path: Path) -> None:
     chosen = np.array([[0, 0, 3e-3], [0, 0, 0.1]])
     write_points(ring, tmp_path / "two.vtu", chosen)
