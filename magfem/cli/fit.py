@@ -147,10 +147,7 @@ def _measured_rows(report: dict[str, Any]) -> list[tuple[str, str]]:
     residual = format_quantity(heldout["absolute_rms"], "flux density")
     noise, beyond = (format_quantity(uncertainty[key], "flux density") for key in ("noise", "model_error"))
     rows = [
-        (
-            "residual",
-            f"{format_quantity(heldout['absolute_rms'], 'flux density')} RMS of held-out {report['held_out']}",
-        ),
+        ("residual", f"{residual} RMS of held-out {report['held_out']}"),
         ("noise", f"{noise} by {uncertainty['noise_from']}, beyond it {beyond}"),
     ]
     if uncertainty["bias_dominates"]:
