@@ -15,9 +15,10 @@ help: ## print this list
 
 report: build/$(REPORT).html ## solve and fit a ring magnet, write build/ring_magnet_4x1.5x1.html
 
-test: .venv/ready ## everything: ruff, mypy, pytest with the browser tests
+test: .venv/ready ## everything: ruff, mypy, pytest with the browser's and Octave's tests
 	@sh tools/system_packages.sh browser
 	@sh tools/mag_manip.sh .venv/bin/python
+	@sh tools/system_packages.sh octave
 	@$(MAKE) --no-print-directory lint
 	.venv/bin/pytest
 

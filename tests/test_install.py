@@ -123,6 +123,16 @@ def test_the_catalogue_travels(programs: Path, tmp_path: Path) -> None:
         run(programs / "python", "-c", load, cwd=tmp_path)
 
 
+def test_exports_travel(programs: Path, tmp_path: Path) -> None:
+    """The files that exports are made of are in the wheel; magpylib, an extra, is not needed to write its module."""
+    for to, file in (("c", "ring.h"), ("mat", "ring.mat"), ("vti", "ring.vti"), ("magpylib", "ring.py")):
+        run(programs / "magfem", "export", CARD, "--to", to, "-o", file, cwd=tmp_path)
+        assert (tmp_path / file).exists()
+    assert (tmp_path / "magfem_field.m").read_text().startswith("function [B, G] = magfem_field")
+    use = "import magfem.errors\ntry: import ring\nexcept magfem.errors.InputError as error: print(error)"
+    assert "pip install" in run(programs / "python", "-c", use, cwd=tmp_path).stdout
+
+
 def test_the_sdist_makes_the_same_wheel(wheel: Path, tmp_path: Path) -> None:
     run(sys.executable, "-m", "hatchling", "build", "--target", "sdist", "--directory", tmp_path, cwd=CHECKOUT)
     (sdist,) = tmp_path.glob("*.tar.gz")

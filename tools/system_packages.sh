@@ -3,10 +3,12 @@
 #   sh tools/system_packages.sh venv PYTHON       ensurepip, which `python -m venv` needs
 #   sh tools/system_packages.sh graphics PYTHON   the shared libraries of Gmsh, and off-screen rendering for VTK
 #   sh tools/system_packages.sh browser           Chromium and its driver; without them the browser tests are skipped
+#   sh tools/system_packages.sh octave            GNU Octave; without it the tests of MATLAB files are skipped
 # What works already is left alone. Where nothing may be installed, it prints the line to type.
 set -eu
 need=${1:-}
 python=${2:-python3}
+skipped=
 
 render='
 import numpy, pyvista
@@ -20,6 +22,7 @@ works() {
     venv) "$python" -c 'import ensurepip, venv' ;;
     graphics) "$python" -c 'import gmsh; gmsh.initialize(); gmsh.finalize()' && "$python" -c "$render" ;;
     browser) command -v chromium && command -v chromedriver ;;
+    octave) command -v octave-cli || command -v octave ;;
     esac
 }
 
@@ -36,9 +39,15 @@ graphics)
 browser)
     missing="no chromium with chromedriver"
     packages="chromium chromium-driver"
+    skipped="the browser tests"
+    ;;
+octave)
+    missing="no octave"
+    packages="octave"
+    skipped="the tests of MATLAB files"
     ;;
 *)
-    sed -n '2,6s/^# //p' "$0" >&2
+    sed -n '2,7s/^# //p' "$0" >&2
     exit 2
     ;;
 esac
@@ -63,10 +72,10 @@ if [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
     if works >"$log" 2>&1; then exit 0; fi
 fi
 
-[ "$need" = browser ] || tail -n 1 "$log" >&2
+[ -n "$skipped" ] || tail -n 1 "$log" >&2
 echo "$missing; type: sudo apt-get install -y --no-install-recommends $packages" >&2
-if [ "$need" = browser ]; then
-    echo "going on: the browser tests will be skipped" >&2
+if [ -n "$skipped" ]; then
+    echo "going on: $skipped will be skipped" >&2
     exit 0
 fi
 exit 1

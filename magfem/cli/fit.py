@@ -1,4 +1,4 @@
-"""`magfem fit`: a field model of a device."""
+"""`magfem fit`: a field model of a device, or of measured samples."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 from magfem.cli.console import listing, moment_text, show_result, table
 from magfem.cli.outputs import output_file
 from magfem.cli.parser import CommandLine, add_dimension, add_resolution
+from magfem.errors import InputError
+from magfem.units import format_quantity, quantity, quoted
 
 if TYPE_CHECKING:
     from magfem.fitting import FieldModel, Recipe
@@ -20,26 +22,39 @@ def add(commands: CommandLine) -> None:
         "fit",
         run,
         "a field model, with errors on held-out points",
-        "Solves a device, fits a field model to the solution and writes the model file. The table holds the\n"
-        "model's relative errors at points that the fit has not seen, next to those of the dissertation's\n"
-        "families on the same data. A name is a fit recipe if there is one, else a device card.",
+        "Solves a device, fits a field model to the solution and writes the model file; or fits one to measured\n"
+        "samples. The table holds the model's relative errors at points that the fit has not seen, next to those of\n"
+        "the dissertation's families on the same data. A name is a fit recipe if there is one, else a device card.\n"
+        "Samples of a coil system (px,py,pz,i0,...,bx,by,bz) make a system file. What else a fit of samples can\n"
+        "do (turned sensors, background, robust loss) is for recipes.",
         [
             "magfem fit ring_magnet_4x1.5x1",
             "magfem fit ring_magnet_4x1.5x1 -o ring.json --resolution 2",
             "magfem fit ./my_recipe.toml -o mine.json",
+            "magfem fit samples.csv -o field.json --sigma '0.1 mT'",
+            "magfem fit scan.csv --device disc_magnet_8x2 --column x=-magnet_x_mm --column 'y==0 mm' -o scan.json",
         ],
     )
-    parser.add_argument("target", metavar="CARD|RECIPE", help="device card or fit recipe: a name or a path")
+    parser.add_argument("target", metavar="CARD|RECIPE|SAMPLES.csv", help="device card, fit recipe or samples")
     parser.add_argument("-o", "--output", metavar="MODEL.json", help="the model (default: its name, here)")
     add_dimension(parser, None, "the recipe's, or 2 if possible")
     add_resolution(parser, None, "the recipe's, or 1")
+    parser.add_argument("--circuit", metavar="NAME", help="of a coil with several circuits")
+    parser.add_argument("--family", metavar="NAME", help='of models, or "search" (default: what suits the device)')
+    samples = parser.add_argument_group("samples")
+    samples.add_argument("--device", metavar="CARD", help="whose samples they are")
+    samples.add_argument("--column", metavar="NAME=COLUMN", action="append", help="what stands for x, y, z, Bx, ...")
+    samples.add_argument("--sigma", metavar="QUANTITY", help="standard deviation of every component, such as '0.1 mT'")
 
 
 def run(options: Namespace) -> int:
-    """Solve, fit, write, print the errors."""
-    name = Path(options.target).name.removesuffix(".toml")
+    """Solve or read, fit, write, print the errors."""
+    name = Path(options.target).name.removesuffix(".toml").removesuffix(".csv")
     path = output_file(options.output or f"{name}.json", [".json"])
-    model = _model(options)
+    from magfem.fitting import model_from_recipe
+
+    recipe = _recipe(options)
+    model = model_from_recipe(recipe, options.dimension, options.resolution)
     model.save(path)
     content = model.to_dict()
     data = {key: content[key] for key in ("name", "unit", "region", "report", "provenance")}
@@ -47,34 +62,43 @@ def run(options: Namespace) -> int:
     return 0
 
 
-def _model(options: Namespace) -> FieldModel:
-    """Solved and fitted, or of coefficients that somebody else published."""
-    from magfem.fem import solve
-    from magfem.fitting import fit
-    from magfem.fitting.published import is_published, load_published
-    from magfem.geometry.catalogue import is_path, names
-
-    if (is_path(options.target, ".toml") or options.target in names("fits", ".toml")) and is_published(options.target):
-        return load_published(options.target)
-    recipe = _recipe(options.target)
-    assert recipe.geometry is not None
-    dimension = recipe.dimension if options.dimension is None else options.dimension
-    resolution = recipe.resolution if options.resolution is None else options.resolution
-    return fit(solve(recipe.geometry, dimension, resolution), recipe)
-
-
-def _recipe(target: str) -> Recipe:
-    """A recipe as it is; a card as a recipe that names the device and nothing else."""
-    from magfem.fitting import Recipe, load_recipe
+def _recipe(options: Namespace) -> Recipe | str | Path:
+    """A recipe's name or path as it is; a card or samples as a recipe that says just that."""
+    from magfem.fitting import Recipe
     from magfem.geometry import load_geometry
     from magfem.geometry.card import read_table
     from magfem.geometry.catalogue import is_path, names
 
+    target, choices = options.target, {"circuit": options.circuit, "family": options.family}
+    if target.lower().endswith((".csv", ".txt")):
+        return _samples_recipe(options)
+    for option in ("device", "column", "sigma"):
+        if getattr(options, option):
+            raise InputError(f"--{option} is for samples: a file that ends in .csv or .txt, got {quoted(target)}")
     if is_path(target, ".toml"):
-        is_recipe = "device" in read_table(Path(target), target)
+        is_recipe = "kind" not in read_table(Path(target), target)
     else:
         is_recipe = target in names("fits", ".toml")
-    return load_recipe(target) if is_recipe else Recipe(geometry=load_geometry(target))
+    if not is_recipe:
+        return Recipe(geometry=load_geometry(target), **choices)
+    for option, value in choices.items():
+        if value:
+            raise InputError(f"--{option} is what the recipe {quoted(target)} says itself")
+    return target if not is_path(target, ".toml") else Path(target)
+
+
+def _samples_recipe(options: Namespace) -> Recipe:
+    from magfem.fitting.recipe import Recipe, SamplesFile
+    from magfem.geometry import load_geometry
+    from magfem.samples import parse_columns
+
+    sigma = quantity(options.sigma, "flux density") if options.sigma else None
+    return Recipe(
+        geometry=load_geometry(options.device) if options.device else None,
+        family=options.family,
+        circuit=options.circuit,
+        samples=SamplesFile(Path(options.target), parse_columns(options.column or []), sigma),
+    )
 
 
 def _text(model: FieldModel, path: Path) -> str:
@@ -93,7 +117,7 @@ def _text(model: FieldModel, path: Path) -> str:
         ("parameters", f"{report['parameters']}, condition {report['condition']:.1e}"),
         ("region", model.region.describe()),
         ("held out", f"{_errors(report['heldout'])} (max), {report['heldout']['points']} points"),
-        ("FEM's share", _errors(report["fem"])),
+        *(_measured_rows(report) if "measurement" in report else [("FEM's share", _errors(report["fem"]))]),
         ("stated bound", _errors(report["bound"])),
         ("moment", moment_text(model.moment)),
         ("model", str(path)),
@@ -115,6 +139,42 @@ def _errors(errors: dict[str, Any]) -> str:
     """Two relative errors in words; each a number, or an object with its `max`."""
     B, gradient = (error["max"] if isinstance(error, dict) else error for error in (errors["B"], errors["gradient"]))
     return f"{B:.1e} in B, {gradient:.1e} in the gradient"
+
+
+def _measured_rows(report: dict[str, Any]) -> list[tuple[str, str]]:
+    """What a fit of samples found besides the model."""
+    found, uncertainty, heldout = report["measurement"], report["uncertainty"], report["heldout"]["B"]
+    residual = format_quantity(heldout["absolute_rms"], "flux density")
+    noise, beyond = (format_quantity(uncertainty[key], "flux density") for key in ("noise", "model_error"))
+    rows = [
+        ("residual", f"{residual} RMS of held-out {report['held_out']}"),
+        ("noise", f"{noise} by {uncertainty['noise_from']}, beyond it {beyond}"),
+    ]
+    if uncertainty["bias_dominates"]:
+        rows.append(("", "the model's own error is larger than the noise: deviations say too little"))
+    for name, one in found["free"].items():
+        rows.append((name, _with_deviation(one["value"], one["deviation"], _dimension(name))))
+    if "remanence" in found:
+        one = found["remanence"]
+        rows.append(("remanence", _with_deviation(one["value"], one["deviation"], "flux density")))
+    if "background" in found:
+        rows.append(("background", ", ".join(format_quantity(b, "flux density") for b in found["background"]["value"])))
+    return rows
+
+
+def _with_deviation(value: float, deviation: float | None, dimension: str) -> str:
+    """A free parameter as people read it."""
+    shown = format_quantity(value, dimension) if dimension else f"{value:.6g}"
+    if deviation is None:
+        return f"{shown}, cannot be told from the coefficients"
+    return f"{shown} ± {format_quantity(deviation, dimension) if dimension else f'{deviation:.2g}'}"
+
+
+def _dimension(name: str) -> str:
+    """What a free parameter is measured in; empty for a factor."""
+    if name.startswith(("tilt", "turn")):
+        return "angle"
+    return "" if name == "gain" else "length"
 
 
 def _row(label: str, family: dict[str, Any], heldout: dict[str, Any]) -> tuple[str, ...]:

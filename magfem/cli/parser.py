@@ -28,6 +28,7 @@ from card to report:
   magfem fit ring_magnet_4x1.5x1 -o ring.json
   magfem validate ring.json
   magfem field ring.json --points points.csv -o field.csv --gradient
+  magfem export ring.json --to c -o ring.h
   magfem report ring.json -o ring.html
 
 Results go to stdout and progress to stderr. With --json the result on stdout is one JSON value.

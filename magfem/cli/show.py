@@ -53,7 +53,7 @@ def run(options: Namespace) -> int:
 def _data(geometry: Geometry, picture: Path) -> dict[str, Any]:
     """The device's numbers, SI units."""
     from magfem.fields.hull import hull_to_dict
-    from magfem.fields.region import region_to_dict
+    from magfem.fields.region_json import region_to_dict
     from magfem.geometry import Coil, describe
 
     return {

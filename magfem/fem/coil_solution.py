@@ -15,7 +15,8 @@ from magfem.fem.coil_currents import CoilCurrents
 from magfem.fem.sheet_currents import SheetCurrents
 from magfem.fields.field import Evaluated, Field, Scaled, Summed, Unit
 from magfem.fields.filament import Filaments
-from magfem.fields.region import Everywhere, Region, region_to_dict
+from magfem.fields.region import Everywhere, Region
+from magfem.fields.region_json import region_to_dict
 from magfem.files import write_folder, write_json
 from magfem.geometry import Coil, describe
 from magfem.mesh.coil_surfaces import coil_surfaces, quadrilaterals

@@ -18,7 +18,8 @@ from magfem.fem.discrete import Currents
 from magfem.fem.meridian_currents import MeridianCurrents
 from magfem.fem.surface_currents import SurfaceCurrents
 from magfem.fields.field import Evaluated, Unit
-from magfem.fields.region import Everywhere, Region, region_to_dict
+from magfem.fields.region import Everywhere, Region
+from magfem.fields.region_json import region_to_dict
 from magfem.files import read_json, write_folder, write_json
 from magfem.geometry import Coil, Magnets, describe, geometry_from_text
 from magfem.mesh.export import write_mesh

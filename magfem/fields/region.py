@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
 from magfem.errors import InputError
-from magfem.fields.hull import Hull, hull_from_dict, hull_to_dict
+from magfem.fields.hull import Hull
 from magfem.typing import ArrayLike, Booleans, Points
 
 
@@ -23,6 +23,14 @@ class Region(Protocol):
 
     def describe(self) -> str:
         """The region in words, for error messages and reports."""
+        ...
+
+
+class SampledRegion(Region, Protocol):
+    """A bounded part of space whose points can be drawn, so that a model of it can be fitted and judged."""
+
+    def layers(self, rng: np.random.Generator, layers: int = 64, per_layer: int = 40, nearest: int = 0) -> Points:
+        """Random points (l, p, 3) m; errors are relative to the largest field of the same layer."""
         ...
 
 
@@ -170,43 +178,3 @@ class Intersection:
 
     def describe(self) -> str:
         return " and ".join(region.describe() for region in self.regions)
-
-
-def region_to_dict(region: Region) -> dict[str, Any]:
-    """The region as JSON-ready data (SI units)."""
-    if isinstance(region, Everywhere):
-        return {"kind": "everywhere"}
-    if isinstance(region, Shell):
-        return {
-            "kind": "shell",
-            "hull": hull_to_dict(region.hull),
-            "clearance": region.clearance,
-            "extent": region.extent,
-            **{name: _bounds(getattr(region, name)) for name in ("z", "rho") if region.windowed},
-        }
-    raise InputError(f"a region of type {type(region).__name__} cannot be written to a model file")
-
-
-def region_from_dict(data: dict[str, Any]) -> Region:
-    """Inverse of `region_to_dict`."""
-    if data.get("kind") == "everywhere":
-        return Everywhere()
-    if data.get("kind") == "shell":
-        window = {name: _pair(data[name]) for name in ("z", "rho") if name in data}
-        shell = Shell(hull_from_dict(data["hull"]), float(data["clearance"]), float(data["extent"]), **window)
-        if not 0 <= shell.clearance < shell.extent < math.inf:
-            raise InputError("a shell needs a clearance of 0 or more and a larger extent")
-        if not (shell.z[0] < shell.z[1] and 0 <= shell.rho[0] < shell.rho[1]):
-            raise InputError("a window needs a lower and a larger upper limit of z and of rho, these 0 or more")
-        return shell
-    raise InputError(f"unknown region kind {data.get('kind')!r}; known: everywhere, shell")
-
-
-def _bounds(pair: tuple[float, float]) -> list[float | None]:
-    """Limits as JSON has them, which knows no infinity."""
-    return [value if math.isfinite(value) else None for value in pair]
-
-
-def _pair(data: Any) -> tuple[float, float]:
-    low, high = data
-    return -math.inf if low is None else float(low), math.inf if high is None else float(high)

@@ -36,6 +36,10 @@ class Ball:
     def describe(self) -> str:
         return f"within {_mm(self.radius)} mm of {_place(self.centre)}"
 
+    def layers(self, rng: np.random.Generator, layers: int = 64, per_layer: int = 40, nearest: int = 0) -> Points:
+        """Random points (1, layers · per_layer, 3) m, as one layer: there is no body to count distances from."""
+        return self.random_points(rng, layers * per_layer)[None]
+
     def random_points(self, rng: np.random.Generator, count: int) -> Points:
         """Points (count, 3) m, half uniform over the volume, half over its surface, where errors are largest."""
         direction = rng.normal(size=(count, 3))
@@ -71,6 +75,10 @@ class Box:
     def describe(self) -> str:
         sides = (f"{_mm(low)} to {_mm(high)}" for low, high in zip(self.low, self.high, strict=True))
         return "x, y, z from " + ", ".join(sides) + " mm"
+
+    def layers(self, rng: np.random.Generator, layers: int = 64, per_layer: int = 40, nearest: int = 0) -> Points:
+        """Random points (1, layers · per_layer, 3) m, as one layer: there is no body to count distances from."""
+        return self.random_points(rng, layers * per_layer)[None]
 
     def random_points(self, rng: np.random.Generator, count: int) -> Points:
         """Points (count, 3) m, half uniform over the volume, half on its faces, the eight corners first."""

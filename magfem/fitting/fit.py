@@ -16,20 +16,22 @@ from magfem.fields.terms_json import terms_to_list
 from magfem.fitting.candidate import Candidate
 from magfem.fitting.families import dissertation_families, members, suitable_families
 from magfem.fitting.least_squares import solve_least_squares
+from magfem.fitting.measured_fit import fit_samples
 from magfem.fitting.model import FieldModel
 from magfem.fitting.provenance import provenance_of
 from magfem.fitting.recipe import SEARCH, Recipe
 from magfem.fitting.sampling import LayeredData, layer_errors, sample, worst_places
 from magfem.fitting.selection import Fitted, choose, climb
 from magfem.geometry import Geometry
+from magfem.samples import Samples
 
 log = logging.getLogger("magfem")
 
 _SAFETY = 1.5  # on the held-out maximum: other random points may hit a little harder
 
 
-def fit(source: Field, recipe: Recipe | None = None) -> FieldModel:
-    """Fit a field model to a solution, or to any Field of a device.
+def fit(source: Field | Samples, recipe: Recipe | None = None) -> FieldModel:
+    """Fit a field model to a solution, to any Field of a device, or to measured samples (`measured_fit`).
 
     recipe: family, region, targets and seed; by default what suits the device. A source that is not a solution must
     bring its device as `source.geometry`, or the recipe must name one.
@@ -37,9 +39,11 @@ def fit(source: Field, recipe: Recipe | None = None) -> FieldModel:
     condition number up to 1e7. Raises InputError for a source without a device, for a coil of several circuits of which
     the recipe names none, and for a field that is not finite or vanishes.
     """
-    recipe = recipe or Recipe()
-    if not isinstance(recipe, Recipe):
+    if not isinstance(recipe, Recipe | None):
         raise InputError("fit takes a Recipe: magfem.fitting.load_recipe reads one from a file")
+    if isinstance(source, Samples):
+        return fit_samples(source, recipe)
+    recipe = recipe or Recipe()
     geometry = _device(source, recipe)
     recipe = recipe.of(geometry)
     field = _circuit(source, recipe)

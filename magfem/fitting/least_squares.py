@@ -16,7 +16,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 from scipy import linalg
 
-from magfem.typing import Floats
+from magfem.typing import Booleans, Floats
 
 Ridge: TypeAlias = Literal["none", "evidence", "leave-one-out"]
 
@@ -27,7 +27,7 @@ class LeastSquares:
 
     parameters: (p,).  covariance: (p, p) for residuals of variance `variance`.  condition: of the scaled columns, with
     the ridge.  variance: |r|²/(n − effective), of one row, or what was given as known.  effective: γ.  ridge: λ.
-    residual: (n,).  leave_one_out: (n,), the residual of each row had it not been fitted.
+    residual: (n,).  basis: (n, p) the columns of U, singular: (p,) s, of the scaled columns.
     """
 
     parameters: Floats
@@ -37,7 +37,26 @@ class LeastSquares:
     effective: float
     ridge: float
     residual: Floats
-    leave_one_out: Floats
+    basis: Floats
+    singular: Floats
+
+    @property
+    def leave_one_out(self) -> Floats:
+        """(n,) the residual of each row had it not been fitted: r_i/(1 − h_i)."""
+        leverage = np.minimum((self.basis**2) @ (self.singular**2 / (self.singular**2 + self.ridge)), 1.0 - 1e-12)
+        left_out: Floats = self.residual / (1.0 - leverage)
+        return left_out
+
+    def without(self, target: Floats, out: Booleans) -> Floats:
+        """The residuals of the rows `out` (n,) had these not been fitted: a small system, no new decomposition.
+
+        In coordinates z = S Vᵀx the remaining rows' normal equations are (1 − U_oᵀU_o + λ S⁻²) z = Uᵀb − U_oᵀb_o.
+        """
+        own = self.basis[out]
+        normal = np.eye(self.singular.size) - own.T @ own + np.diag(self.ridge / self.singular**2)
+        coordinates = linalg.lstsq(normal, self.basis.T @ target - own.T @ target[out], cond=1e-12)[0]
+        left_out: Floats = target[out] - own @ coordinates
+        return left_out
 
 
 def solve_least_squares(
@@ -73,7 +92,6 @@ def solve_least_squares(
     kept = s**2 / (s**2 + chosen)
     parameters = vt.T @ (kept / s * projected) / scale
     residual = target - u @ (kept * projected)
-    leverage = np.minimum((u**2) @ kept, 1.0 - 1e-12)
     effective = float(kept.sum())
     if variance is None:
         variance = float(residual @ residual) / max(rows - effective, 1.0)
@@ -86,7 +104,8 @@ def solve_least_squares(
         effective=effective,
         ridge=chosen,
         residual=residual,
-        leave_one_out=residual / (1.0 - leverage),
+        basis=u,
+        singular=s,
     )
 
 

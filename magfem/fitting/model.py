@@ -12,12 +12,15 @@ import numpy as np
 
 from magfem.errors import CardError, InputError
 from magfem.fields.field import Evaluated, Unit
-from magfem.fields.region import Shell, region_from_dict, region_to_dict
+from magfem.fields.region import SampledRegion, Shell
+from magfem.fields.region_json import region_from_dict, region_to_dict
 from magfem.fields.terms import Terms
 from magfem.fields.terms_json import number, numbers, terms_from_list, terms_to_list
+from magfem.fields.workspace_region import Ball, Box
 from magfem.files import read_json, write_json
+from magfem.fitting.uncertainty import predictive_deviation
 from magfem.geometry.catalogue import resolve, short_path
-from magfem.typing import Floats, Integers, Jet, Points
+from magfem.typing import ArrayLike, Floats, Integers, Jet, Outside, Points
 from magfem.units import describe, one_line
 
 FORMAT, VERSION = "magfem-model", 1
@@ -37,7 +40,7 @@ class FieldModel(Evaluated):
     lowered: Terms
     parameter: Integers
     covariance: Floats
-    region: Shell
+    region: SampledRegion
     report: dict[str, Any]
     provenance: dict[str, Any]
     unit: Unit = "T"
@@ -52,6 +55,14 @@ class FieldModel(Evaluated):
 
     def evaluate(self, points: Points, order: int) -> Jet:
         return self.lowered.jet(points, order)
+
+    def deviation(self, points: ArrayLike, outside: Outside = "raise") -> tuple[Floats, Floats]:
+        """Standard deviations of B (..., 3) T and of the gradient (..., 3, 3) T/m at `points` (..., 3) m.
+
+        What the noise of the fitted data makes of the coefficients, by their covariance; not what the model cannot
+        describe: `report["uncertainty"]` says whether that dominates. Raises as `jet` does.
+        """
+        return predictive_deviation(self, points, outside)
 
     @property
     def moment(self) -> Floats:
@@ -132,8 +143,8 @@ def load_model(name_or_path: str | Path) -> FieldModel:
             raise ValueError("one row and one column for each parameter")
         key = "region"
         region = region_from_dict(data["region"])
-        if not isinstance(region, Shell):
-            raise ValueError("a shell around a hull")
+        if not isinstance(region, Shell | Ball | Box):
+            raise ValueError("a shell around a hull, a ball or a box")
         key = "report.bound"
         if not all(number(data["report"]["bound"][name]) >= 0 for name in ("B", "gradient")):
             raise ValueError("relative errors of B and gradient")

@@ -24,17 +24,19 @@ def provenance_of(source: Field, geometry: Geometry | None) -> dict[str, Any]:
         "source": "finite elements" if solution else type(source).__name__,
         "solver": solution and solution.settings,
         "solution": solution and {"error": solution.error, "quantities": solution.quantities, "stats": solution.stats},
-        "versions": versions(),
-        "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
+        **versions_and_date(),
     }
 
 
-def versions() -> dict[str, str]:
-    """Of Python, magfem and what it stands on."""
+def versions_and_date() -> dict[str, Any]:
+    """Of Python, magfem and what it stands on; today."""
     return {
-        "python": platform.python_version(),
-        "magfem": __version__,
-        **{package: _version(package) for package in _PACKAGES},
+        "versions": {
+            "python": platform.python_version(),
+            "magfem": __version__,
+            **{package: _version(package) for package in _PACKAGES},
+        },
+        "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
     }
 
 

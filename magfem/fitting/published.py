@@ -31,7 +31,7 @@ from magfem.fields.hull import SphereHull
 from magfem.fields.region import Shell
 from magfem.fields.terms import HIGHEST_DEGREE, Terms, harmonics
 from magfem.fitting.model import FieldModel
-from magfem.fitting.provenance import versions
+from magfem.fitting.provenance import versions_and_date
 from magfem.geometry.card import Table, read_table
 from magfem.geometry.catalogue import resolve, short_path
 from magfem.typing import Floats
@@ -109,7 +109,7 @@ def load_published(name_or_path: str | Path) -> FieldModel:
             "solver": None,
             "solution": None,
             "recipe": {"path": table.origin.path, "sha256": table.origin.sha256},
-            "versions": versions(),
+            **versions_and_date(),
             "date": None,
         },
         unit="T/A",

@@ -10,16 +10,24 @@ from typing import Any
 
 from magfem.errors import InputError
 from magfem.fields.region import Shell
-from magfem.fitting.families import FAMILIES, family_of, members
+from magfem.fitting.families import FAMILIES, SAMPLE_FAMILIES, family_of, members
+from magfem.fitting.least_squares import Ridge
+from magfem.fitting.measurement import Loss, Weighting
 from magfem.fitting.objective import Objective
-from magfem.geometry import Coil, Geometry, load_geometry
-from magfem.geometry.card import Table, read_table
-from magfem.geometry.catalogue import resolve, short_path
+from magfem.geometry import Coil, Geometry
+from magfem.samples.single_components import Measurement
 
-SEARCH = "search"
-"""Instead of a family's name: all families that describe the device."""
+SEARCH, DEVICE = "search", "device"
+"""Instead of a family's name: all families that describe the device; for samples, the device's own field, scaled."""
 
-_KEYS = ("device", "name", "family", "seed", "circuit", "terms", "region", "target", "solve", "fit")
+
+@dataclass(frozen=True)
+class SamplesFile:
+    """Measured samples in a file: its path, what its columns are (`read_samples`), deviations in T or None."""
+
+    path: Path
+    columns: Mapping[str, str] = field(default_factory=dict)
+    sigma: float | None = None
 
 
 @dataclass(frozen=True)
@@ -32,7 +40,14 @@ class Recipe:
     errors to stay below; None takes 5e-5 and 5e-4, for closed paths 1e-3 and 1e-2.  objective: "layers" (B and
     gradient, near and far alike), "absolute" (B in T, 2.8) or "relative" (every point of B against itself, 5.3).
     most_parameters: None for no limit.  seed: of the sample points.  dimension, resolution: how the command line solves
-    the device first.  name: the model's; None takes the device's.
+    the device first.  name: the model's; None takes the device's.  source: where the recipe's
+    choices come from.
+
+    For samples: weighting "sigma", "absolute" or "relative" (None: by what they state); ridge "none", "evidence" (the
+    default) or "leave-one-out"; loss "squares" or "huber"; heldout "samples" or "regions" (None: by their number);
+    background, a static field to be found as well; free, the parameters of `alignment.NAMES` that are free, with
+    bounds or None for sensible ones; samples, where the command line finds them.  measurements: single components that
+    the whole model is scaled to.
     """
 
     geometry: Geometry | None = None
@@ -48,14 +63,23 @@ class Recipe:
     dimension: int | None = None
     resolution: float = 1.0
     name: str | None = None
+    source: str = ""
+    weighting: Weighting | None = None
+    ridge: Ridge | None = None
+    loss: Loss = "squares"
+    heldout: str | None = None
+    background: bool = False
+    free: Mapping[str, tuple[float, float] | None] = field(default_factory=dict)
+    samples: SamplesFile | None = None
+    measurements: tuple[Measurement, ...] = ()
 
     def __post_init__(self) -> None:
         for key in _RULES:
-            if complaint := _complaint(key, getattr(self, key)):
+            if complaint := complaint_about(key, getattr(self, key)):
                 raise InputError(f"{complaint}, got {getattr(self, key)!r}")
         if self.circuit is not None and self.geometry is not None:
             _check_circuit(self.geometry, self.circuit)
-        if self.family and self.family != SEARCH and self.geometry:
+        if self.family in FAMILIES and self.geometry:
             region = self.region or self.geometry.region
             next(members(self.family, self.geometry, region, self.family_options(self.family)))
 
@@ -79,48 +103,10 @@ class Recipe:
         return replace(self, geometry=geometry, region=region, family=family)
 
 
-def load_recipe(name_or_path: str | Path) -> Recipe:
-    """A fit recipe of the catalogue by name, or the file at a path. Raises InputError, CardError."""
-    where = ("fits", name_or_path, ".toml")
-    table = read_table(resolve(*where), short_path(*where))
-    table.only(*_KEYS)
-    geometry = load_geometry(_device_path(table, resolve(*where)))
-    values: dict[str, Any] = {"geometry": geometry}
-    for key in ("name", "family", "circuit"):
-        if key in table:
-            values[key] = _checked(table, key, table.text(key))
-    if "seed" in table:
-        values["seed"] = int(_checked(table, "seed", table.number("seed")))
-    for name, keys in _TABLES.items():
-        if name in table:
-            part = table.table(name)
-            part.only(*keys)
-            for key, target in keys.items():
-                if key in part:
-                    values[target] = _value(part, key, target)
-    if "terms" in table:
-        values["options"] = dict(table.table("terms").values)
-    if "region" in table:
-        values["region"] = _region(table.table("region"), geometry.region)
-    try:
-        return Recipe(**values)
-    except InputError as error:
-        raise table.error(str(error), "terms" if "option" in str(error) else "family") from None
-
-
-_TABLES = {
-    "target": {"B": "target_B", "gradient": "target_gradient"},
-    "solve": {"dimension": "dimension", "resolution": "resolution"},
-    "fit": {"objective": "objective", "most_parameters": "most_parameters"},
-}
-"""The tables of a recipe file, their keys, and the recipe's fields that these set."""
-
-_WHOLE = ("dimension", "most_parameters")
-
 _RULES: dict[str, tuple[Callable[[Any], bool], str]] = {
     "family": (
-        lambda value: value is None or value == SEARCH or value in FAMILIES,
-        f"unknown family; known: {SEARCH}, {', '.join(FAMILIES)}",
+        lambda value: value in (None, SEARCH, DEVICE) or value in FAMILIES or value in SAMPLE_FAMILIES,
+        f"unknown family; known: {SEARCH}, {', '.join(FAMILIES)}; for samples {DEVICE}, {', '.join(SAMPLE_FAMILIES)}",
     ),
     "target_B": (lambda value: value is None or 0 < value < 1, "target_B must be a relative error between 0 and 1"),
     "target_gradient": (
@@ -131,6 +117,16 @@ _RULES: dict[str, tuple[Callable[[Any], bool], str]] = {
         lambda value: value in ("layers", "absolute", "relative"),
         'objective must be "layers", "absolute" or "relative"',
     ),
+    "weighting": (
+        lambda value: value in (None, "sigma", "absolute", "relative"),
+        'weighting must be "sigma", "absolute" or "relative"',
+    ),
+    "ridge": (
+        lambda value: value in (None, "none", "evidence", "leave-one-out"),
+        'ridge must be "none", "evidence" or "leave-one-out"',
+    ),
+    "loss": (lambda value: value in ("squares", "huber"), 'loss must be "squares" or "huber"'),
+    "heldout": (lambda value: value in (None, "samples", "regions"), 'heldout must be "samples" or "regions"'),
     "most_parameters": (
         lambda value: value is None or (value >= 1 and value == int(value)),
         "most_parameters must be a whole number, 1 or more",
@@ -141,7 +137,7 @@ _RULES: dict[str, tuple[Callable[[Any], bool], str]] = {
 }
 
 
-def _complaint(key: str, value: Any) -> str:
+def complaint_about(key: str, value: Any) -> str:
     """What is wrong with a recipe's value; empty when nothing is."""
     if key not in _RULES:
         return ""
@@ -149,48 +145,8 @@ def _complaint(key: str, value: Any) -> str:
     return "" if holds(value) else sentence
 
 
-def _checked(table: Table, key: str, value: Any, field: str = "") -> Any:
-    """A value of the file, which must keep the rule of the recipe's `field` (default: `key`)."""
-    if complaint := _complaint(field or key, value):
-        raise table.error(complaint, key)
-    return value
-
-
-def _value(table: Table, key: str, target: str) -> Any:
-    if target == "objective":
-        return _checked(table, key, table.text(key), target)
-    number = _checked(table, key, table.number(key), target)
-    return int(number) if target in _WHOLE else number
-
-
-def _region(table: Table, device: Shell) -> Shell:
-    """The device's region with the limits that the recipe states: clearance, extent, and pairs of z and rho."""
-    table.only("clearance", "extent", "z", "rho")
-    limits: dict[str, Any] = {}
-    for key in ("clearance", "extent"):
-        if key in table:
-            limits[key] = table.quantity(key, "length")
-    for key in ("z", "rho"):
-        if key in table:
-            pair = table.value(key)
-            if not isinstance(pair, list) or len(pair) not in (1, 2):
-                raise table.error(f'{key} must be one or two lengths, such as ["1 mm", "6 mm"]', key)
-            low, *high = [Table(table.origin, {key: text}, table.path).quantity(key, "length") for text in pair]
-            limits[key] = (low, high[0] if high else math.inf)
-    region = replace(device, **limits)
-    if not (region.clearance < region.extent and region.z[0] < region.z[1] and 0 <= region.rho[0] < region.rho[1]):
-        raise table.error("lower limits must be smaller than upper ones, and rho not negative")
-    return region
-
-
 def _check_circuit(geometry: Geometry, name: str) -> None:
     known = [circuit.name for circuit in geometry.circuits] if isinstance(geometry, Coil) else []
     if name not in known:
         has = f"it has {', '.join(known)}" if known else "it is no coil"
         raise InputError(f"{geometry.name} has no circuit {name!r}; {has}")
-
-
-def _device_path(table: Table, recipe: Path) -> str | Path:
-    """The device's catalogue name, or its card's path seen from the recipe's folder."""
-    device = table.text("device")
-    return recipe.parent / device if device.endswith(".toml") else device

@@ -8,7 +8,7 @@ import numpy as np
 
 from magfem.fields import Field
 from magfem.report.numbers import number, percent
-from magfem.report.recipe import Measurement
+from magfem.samples.single_components import Measurement
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,8 @@ from magfem.fitting import FieldModel, fit, load_model
 from magfem.geometry import Magnets, geometry_from_text, load_geometry
 from magfem.geometry.card import read_table
 from magfem.geometry.catalogue import is_path, names
-from magfem.report.recipe import Measurement, Recipe, load_recipe
+from magfem.report.recipe import Recipe, load_recipe
+from magfem.samples.single_components import Measurement
 
 log = logging.getLogger("magfem")
 

@@ -123,8 +123,13 @@ def _deviation_columns(
 
 def _unit(source: Source, field: Sequence[Column | None], deviations: Sequence[Column | None]) -> Literal["T", "T/A"]:
     """The unit of B; deviations without a unit are in the same."""
-    kinds = {(column.dimension or FLUX_DENSITIES[0]): column.name for column in field if column is not None}
-    kinds |= {column.dimension: column.name for column in deviations if column is not None and column.dimension}
+    kinds: dict[str, str] = {}
+    for column in field:
+        if column is not None:
+            kinds.setdefault(column.dimension or FLUX_DENSITIES[0], column.name)
+    for column in deviations:
+        if column is not None and column.dimension:
+            kinds.setdefault(column.dimension, column.name)
     if len(kinds) > 1:
         names = " and ".join(quoted(kinds[kind]) for kind in FLUX_DENSITIES)
         raise InputError(

@@ -47,7 +47,7 @@ class Column:
     constant: float = 0.0
 
     def in_si(self, cells: Floats) -> Floats:
-        """The SI values of the column's cells; for 1.1 mm exactly the float 0.0011."""
+        """The SI values of the column's cells. A division by 1000 rounds once, a product with 0.001 twice."""
         if self.index is None:
             return np.full(len(cells), self.constant)
         divisor = round(1 / self.scale) if self.scale < 1 else 0
@@ -176,7 +176,7 @@ def _own_parts(cell: str) -> tuple[str, str]:
 
 
 def _mapped(named: Named, name: str, text: str, dimensions: Sequence[str]) -> Column:
-    if text.startswith("="):
+    if text.startswith("=") and text not in named.header:
         return _constant(name, text[1:].strip(), dimensions)
     for sign, wanted in ((1.0, text), (-1.0, text[1:].strip() if text.startswith("-") else "")):
         if not wanted:

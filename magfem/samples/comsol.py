@@ -59,7 +59,7 @@ def read_comsol(
     text = read_text(path)
     if not is_comsol(text):
         raise InputError(
-            f"not an export of COMSOL: expected its header in lines that begin with %, then numbers [{path}]"
+            f"not an export of COMSOL: expected its header, lines that begin with %, then numbers [{path}]"
         )
     return comsol_samples(path, text, columns, sigma)
 

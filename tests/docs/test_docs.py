@@ -82,6 +82,18 @@ EXPECTED = {
         ("finer.report['heldout']['B']['max'] <= 5e-5", True, 0),
         ("abs(again.B([0, 0, 3e-3]) - solution.B([0, 0, 3e-3])).max()", 0.0, 0.0),
     ],
+    "measured-data.md": [
+        ("samples.points[1, 0] * samples.B[1, 2] * samples.sigma[1, 1]", 1e-3 * 11.43e-3 * 20e-6, 1e-12),
+        ("scan.points[0, 0] - scan.points[0, 2]", 22e-3, 1e-12),
+        ("system.currents[1, 1] * system.B[1, 0]", -0.3e-3, 1e-12),
+        ("half_plane.points[1, 0] * half_plane.B[1, 2]", 2e-3 * 0.021, 1e-12),
+        ("abs(again.B - scan.B).max() + abs(again.points - scan.points).max()", 0.0, 0.0),
+    ],
+    "exchange.md": [
+        ("(B - block.getB((0, 0, 4e-3)))[2]", 0.973 * RIGID, 5e-3),
+        ("gradient[2, 2] / (theirs.B([0, 0, 4.001e-3]) - theirs.B([0, 0, 3.999e-3]))[2] * 2e-6", 1.0, 1e-6),
+        ("grid['B'][grid.find_closest_point((0, 0, 3e-3))][2]", 0.973 * RIGID, 5e-3),
+    ],
 }
 
 

@@ -15,7 +15,8 @@ from scipy.stats import chisquare, kstest
 
 from magfem.errors import InputError
 from magfem.fields.hull import BoxHull, CylinderHull, Hull, PolytopeHull, SphereHull, hull_from_dict, hull_to_dict
-from magfem.fields.region import Shell, region_from_dict, region_to_dict
+from magfem.fields.region import Shell
+from magfem.fields.region_json import region_from_dict, region_to_dict
 from magfem.typing import Floats
 
 BOX = BoxHull((4e-3, 1e-3, 2e-3))

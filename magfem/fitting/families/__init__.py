@@ -17,12 +17,14 @@ from magfem.fitting.candidate import Candidate, Displaceable
 from magfem.fitting.families.charged_faces import charged_faces
 from magfem.fitting.families.closed_paths import closed_paths
 from magfem.fitting.families.coaxial_loops import wall_and_face_loops, winding_loops
+from magfem.fitting.families.free import exterior_harmonics, interior_harmonics
 from magfem.fitting.families.harmonics import solid_harmonics
 from magfem.fitting.families.multipoles import axial_multipole, displaced_multipoles, eight_source
 from magfem.fitting.families.oblate import oblate_discs
 from magfem.fitting.families.tubes import cylinder_of, tubes_of
 from magfem.geometry import Coil, Geometry
 from magfem.geometry.circuit import CoaxialWinding
+from magfem.samples import Samples
 
 Member: TypeAlias = Candidate | Displaceable
 
@@ -40,15 +42,34 @@ FAMILIES: dict[str, Callable[..., Iterator[Member]]] = {
 """Families that recipes may name: each yields its candidates from few parameters to many."""
 
 
+SAMPLE_FAMILIES: dict[str, Callable[..., Iterator[Candidate]]] = {
+    "interior_harmonics": interior_harmonics,
+    "exterior_harmonics": exterior_harmonics,
+}
+"""Families for samples of no known device."""
+
+
+def sample_members(family: str, samples: Samples, options: Mapping[str, Any]) -> Iterator[Candidate]:
+    """The candidates of a family of `SAMPLE_FAMILIES`. Raises InputError for options that it does not have."""
+    make = SAMPLE_FAMILIES[family]
+    _check_options(family, make, options)
+    return make(samples, **options)
+
+
 def members(family: str, geometry: Geometry, region: Shell, options: Mapping[str, Any]) -> Iterator[Member]:
     """The candidates of a family. Raises InputError for options that it does not have."""
     make = FAMILIES[family]
-    known = [name for name in inspect.signature(make).parameters if name not in ("geometry", "region", "window")]
+    _check_options(family, make, options)
+    return make(geometry, region, **options)
+
+
+def _check_options(family: str, make: Callable[..., Any], options: Mapping[str, Any]) -> None:
+    given = ("geometry", "region", "window", "samples")
+    known = [name for name in inspect.signature(make).parameters if name not in given]
     for name in options:
         if name not in known:
             has = f"it has {', '.join(known)}" if known else "it has none"
             raise InputError(f"the family {family} has no option {name!r}; {has}")
-    return make(geometry, region, **options)
 
 
 def family_of(geometry: Geometry) -> str:

@@ -25,7 +25,7 @@ from magfem.report.figures.style import (
     png,
     wrapped,
 )
-from magfem.report.recipe import Measurement
+from magfem.samples.single_components import Measurement
 from magfem.typing import Booleans, Floats
 
 MILLI = 1e3

@@ -1,0 +1,48 @@
+"""From a recipe to a model, all the way: published coefficients, measured samples, or a device that is solved first."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from magfem.errors import InputError
+from magfem.fem import solve
+from magfem.fitting.fit import fit
+from magfem.fitting.model import FieldModel
+from magfem.fitting.published import is_published, load_published
+from magfem.fitting.recipe import Recipe
+from magfem.fitting.recipe_file import load_recipe
+from magfem.fitting.scaling import scale_to, scaled
+from magfem.samples import SystemSamples, read_samples
+
+
+def model_from_recipe(
+    recipe: Recipe | str | Path, dimension: int | None = None, resolution: float | None = None
+) -> FieldModel:
+    """The model that a recipe, or the recipe of a name or path, makes.
+
+    dimension, resolution: of the solve, in place of the recipe's. Raises InputError, CardError, ConvergenceError …
+    """
+    if not isinstance(recipe, Recipe):
+        if is_published(recipe):
+            return load_published(recipe)
+        recipe = load_recipe(recipe)
+    recipe = replace(
+        recipe,
+        dimension=recipe.dimension if dimension is None else dimension,
+        resolution=recipe.resolution if resolution is None else resolution,
+    )
+    model = _fitted(recipe)
+    return scaled(model, scale_to(model, recipe.measurements)) if recipe.measurements else model
+
+
+def _fitted(recipe: Recipe) -> FieldModel:
+    if recipe.samples is not None:
+        file = recipe.samples
+        samples = read_samples(file.path, file.columns, file.sigma)
+        if isinstance(samples, SystemSamples):
+            raise InputError(f"samples of a coil system make a system, not a model [{file.path}]")
+        return fit(samples, recipe)
+    if recipe.geometry is None:
+        raise InputError("a recipe names a device, a file of samples, or both")
+    return fit(solve(recipe.geometry, recipe.dimension, recipe.resolution), recipe)

@@ -1,0 +1,253 @@
+"""A measurement as a separable least squares: linear coefficients, and free parameters of source and sensor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Literal, TypeAlias
+
+import numpy as np
+from scipy import linalg
+from scipy.optimize import least_squares
+
+from magfem.fitting.alignment import Alignment
+from magfem.fitting.candidate import Candidate, Displaceable
+from magfem.fitting.least_squares import LeastSquares, Ridge, solve_least_squares
+from magfem.samples import Samples
+from magfem.typing import Booleans, Floats, Integers
+
+Weighting: TypeAlias = Literal["sigma", "absolute", "relative"]
+Loss: TypeAlias = Literal["squares", "huber"]
+
+_HUBER = 1.345  # standard deviations: 95 % as sharp as plain squares where the noise is normal
+_STEP = 1e-6  # of the bounds' distance, for the derivatives by the free parameters
+CONDITION = 1e7
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """What is fitted to samples.
+
+    member: a candidate, or one whose places are free as well.  alignment: the free parameters of source and sensor.
+    background: whether a static field in the sensor's axes is added.  weighting: rows over their own deviation, plain
+    (T), or over |B| (5.3).  loss: plain squares, or Huber's, which outliers pull less.
+    """
+
+    samples: Samples
+    member: Candidate | Displaceable
+    alignment: Alignment
+    background: bool
+    weighting: Weighting
+    ridge: Ridge
+    loss: Loss
+
+    @property
+    def free(self) -> tuple[str, ...]:
+        """Names of the nonlinear parameters: places of sources, then those of the alignment."""
+        places = self.member.names if isinstance(self.member, Displaceable) else ()
+        return (*places, *self.alignment.names)
+
+    @cached_property
+    def bounds(self) -> tuple[Floats, Floats]:
+        """Of the nonlinear parameters, (q,) each."""
+        own = [(self.member.lower, self.member.upper)] if isinstance(self.member, Displaceable) else []
+        low, high = zip(*own, (self.alignment.lower, self.alignment.upper), strict=True)
+        return np.concatenate(low), np.concatenate(high)
+
+    @cached_property
+    def starts(self) -> Floats:
+        """Where to search from (k, q)."""
+        middle = 0.5 * (self.alignment.lower + self.alignment.upper)
+        places = self.member.start if isinstance(self.member, Displaceable) else np.empty((1, 0))
+        return np.concatenate([places, np.tile(middle, (len(places), 1))], axis=1)
+
+    @cached_property
+    def scale(self) -> Floats:
+        """What every component (n, 3) is divided by before squares are summed, T or one."""
+        B = self.samples.B
+        if self.weighting == "sigma":
+            assert self.samples.sigma is not None
+            return self.samples.sigma
+        if self.weighting == "relative":
+            size = np.sqrt(np.nansum(B**2, axis=1, keepdims=True))
+            return np.broadcast_to(np.maximum(size, 0.01 * size.max()), B.shape)
+        return np.ones_like(B)
+
+    @property
+    def measured(self) -> Booleans:
+        """Which components (n, 3) there are; the others have no row."""
+        return self.samples.measured
+
+    @property
+    def point_of_row(self) -> Integers:
+        """The sample (r,) that each row belongs to."""
+        return np.nonzero(self.measured)[0]
+
+    def candidate(self, theta: Floats) -> Candidate:
+        """The linear candidate for nonlinear parameters (q,)."""
+        if isinstance(self.member, Displaceable):
+            return self.member.make(theta[: len(self.member.names)])
+        return self.member
+
+    def matrix(self, theta: Floats) -> Floats:
+        """Columns of all linear parameters, background last: (r, p), scaled."""
+        own = theta[len(theta) - len(self.alignment.names) :]
+        columns = self.alignment.columns(self.candidate(theta), self.samples.points, own)
+        if self.background:
+            background = np.broadcast_to(np.eye(3)[:, None], (3, *self.samples.points.shape))
+            columns = np.concatenate([columns, background])
+        return (columns / self.scale)[:, self.measured].T
+
+    @cached_property
+    def target(self) -> Floats:
+        """Rows (r,) to be met, scaled."""
+        scaled: Floats = (self.samples.B / self.scale)[self.measured]
+        return scaled
+
+    @property
+    def variance(self) -> float | None:
+        """Of a row, where the samples say it."""
+        return 1.0 if self.weighting == "sigma" else None
+
+    def solve(self, theta: Floats, weight: Floats) -> LeastSquares:
+        """Linear parameters for nonlinear ones (q,), rows times `weight` (r,)."""
+        matrix, target = self.matrix(theta) * weight[:, None], self.target * weight
+        return solve_least_squares(matrix, target, self.ridge, self.variance, CONDITION)
+
+
+@dataclass(frozen=True)
+class MeasuredFit:
+    """A measurement solved.
+
+    theta: (q,) nonlinear parameters.  solved: the linear ones, background last.  weight: (r,) of the rows, below one
+    for outliers.  joint: (r, p + q) derivatives of all rows by all parameters.  covariance: (p + q, p + q).
+    degenerate: names of nonlinear parameters that the coefficients can stand in for.
+    left_out: (r,) residual of every row had its sample not been fitted, in units of its scale.
+    """
+
+    measurement: Measurement
+    theta: Floats
+    solved: LeastSquares
+    weight: Floats
+    covariance: Floats
+    degenerate: tuple[str, ...]
+    left_out: Floats
+
+    @property
+    def candidate(self) -> Candidate:
+        """Linear candidate at the places found."""
+        return self.measurement.candidate(self.theta)
+
+    @property
+    def residual(self) -> Floats:
+        """(r,) data less model, scaled, unweighted."""
+        return self.solved.residual / self.weight
+
+
+_ALIKE = 1e-3
+"""Share of a nonlinear parameter's effect that the linear ones must leave unexplained for it to count as determined."""
+
+
+def solve_measurement(measurement: Measurement) -> MeasuredFit:
+    """Fit all parameters; outliers weigh less where the loss says so."""
+    weight = np.ones(measurement.target.size)
+    theta = _project(measurement, weight, measurement.starts)
+    for _ in range(20 if measurement.loss == "huber" else 0):
+        residual = measurement.solve(theta, weight).residual / weight
+        spread = 1.0 if measurement.variance else max(1.4826 * float(np.median(np.abs(residual))), 1e-300)
+        new = np.sqrt(np.minimum(1.0, _HUBER * spread / np.maximum(np.abs(residual), 1e-300)))
+        if np.abs(new - weight).max() < 1e-3:
+            break
+        weight = new
+        theta = _project(measurement, weight, theta[None])
+    solved = measurement.solve(theta, weight)
+    return _judged(measurement, theta, solved, weight) if measurement.free else _linear(measurement, solved, weight)
+
+
+def _project(measurement: Measurement, weight: Floats, starts: Floats) -> Floats:
+    """The nonlinear parameters (q,) that leave the least, by variable projection from every start."""
+    if not measurement.free:
+        return np.empty(0)
+    low, high = measurement.bounds
+    # While places are sought the ridge must not move with them.
+    plain = replace(measurement, ridge="none")
+
+    def residual(theta: Floats) -> Floats:
+        return plain.solve(theta, weight).residual
+
+    found = [
+        least_squares(residual, start, bounds=(low, high), x_scale=high - low, xtol=1e-12, ftol=1e-12, gtol=1e-12)
+        for start in starts
+    ]
+    best: Floats = min(found, key=lambda one: float(one.cost)).x
+    return best
+
+
+def _linear(measurement: Measurement, solved: LeastSquares, weight: Floats) -> MeasuredFit:
+    """Without nonlinear parameters the decomposition of the linear ones says it all."""
+    kept = solved.singular**2 / (solved.singular**2 + solved.ridge)
+    left_out = _left_out(measurement, solved.basis * np.sqrt(kept), solved.residual)
+    return MeasuredFit(measurement, np.empty(0), solved, weight, solved.covariance, (), left_out / weight)
+
+
+def _judged(measurement: Measurement, theta: Floats, solved: LeastSquares, weight: Floats) -> MeasuredFit:
+    """Covariance of all parameters together, what cannot be told apart, and leave-one-out residuals."""
+    matrix = measurement.matrix(theta) * weight[:, None]
+    q = theta.size
+    if q:
+        low, high = measurement.bounds
+        slopes = []
+        for k, step in enumerate(_STEP * (high - low)):
+            up, down = theta.copy(), theta.copy()
+            up[k], down[k] = min(theta[k] + step, high[k]), max(theta[k] - step, low[k])
+            change = (measurement.matrix(up) - measurement.matrix(down)) @ solved.parameters / (up[k] - down[k])
+            slopes.append(change * weight)
+        matrix = np.column_stack([matrix, *slopes])
+    length = np.linalg.norm(matrix, axis=0)
+    length[length == 0] = 1.0
+    scaled = matrix / length
+    linear = scaled.shape[1] - q
+    basis, _ = linalg.qr(scaled[:, :linear], mode="economic")
+    degenerate: list[str] = []
+    kept = list(range(linear))
+    for k, name in enumerate(measurement.free):
+        own = scaled[:, linear + k]
+        left = own - basis @ (basis.T @ own)
+        if np.linalg.norm(left) < _ALIKE:
+            degenerate.append(name)
+            continue
+        kept.append(linear + k)
+        basis = np.column_stack([basis, left / np.linalg.norm(left)])
+    # The ridge is the prior of the linear parameters, in the same units as in `solve_least_squares`.
+    prior = np.sqrt(solved.ridge) * np.eye(len(kept))[:linear]
+    _, s, vt = linalg.svd(np.vstack([scaled[:, kept], prior]), full_matrices=False)
+    root = vt.T / np.maximum(s, np.finfo(float).tiny)
+    covariance = np.full((linear + q, linear + q), np.nan)
+    covariance[np.ix_(kept, kept)] = solved.variance * root @ root.T / np.outer(length[kept], length[kept])
+    return MeasuredFit(
+        measurement=measurement,
+        theta=theta,
+        solved=solved,
+        weight=weight,
+        covariance=covariance,
+        degenerate=tuple(degenerate),
+        left_out=_left_out(measurement, scaled[:, kept] @ root, solved.residual) / weight,
+    )
+
+
+def _left_out(measurement: Measurement, root: Floats, residual: Floats) -> Floats:
+    """Leave-one-out residuals (r,), a sample with all its components at a time: (1 − H_i)⁻¹ r_i, H_i its leverages.
+
+    root: (r, k), whose product with its own transpose is the hat matrix.
+    """
+    point = measurement.point_of_row
+    result = np.empty_like(residual)
+    order = np.argsort(point, kind="stable")
+    bounds = np.flatnonzero(np.diff(point[order], prepend=-1, append=-2))
+    counts = np.diff(bounds)
+    for size in np.unique(counts):
+        rows = order[bounds[:-1][counts == size][:, None] + np.arange(size)]  # (k, size)
+        block = root[rows]
+        remaining = (1.0 + 1e-12) * np.eye(size) - block @ np.swapaxes(block, 1, 2)
+        result[rows] = np.linalg.solve(remaining, residual[rows][..., None])[..., 0]
+    return result
