@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import logging
 import re
 from dataclasses import replace
@@ -15,6 +16,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 import magfem
 from magfem.actuation import CoilSystem, SystemCoil, write_mpem
+from magfem.cli.program import main
 from magfem.constants import MU_0
 from magfem.errors import ConvergenceError, InputError
 from magfem.fields.hull import CylinderHull
@@ -142,7 +144,7 @@ PILLS = charge_discs([[0, 0, -0.05], [0, 0, -0.06]], 0.01, [1.0, -1.0])
     "terms", [solenoid(), SQUARE, PILLS, solenoid() + SQUARE], ids=["loops", "path", "discs", "both"]
 )
 def test_stated_residual_is_what_other_points_find(terms, tmp_path):
-    """The residual holds, to a factor 1.5 for the maximum, at points that neither fitted nor judged."""
+    """The residual holds at points that neither fitted nor judged."""
     system, file = one_coil(terms), tmp_path / "coil.yaml"
     done = write_mpem(system, file)
     points = BALL.random_points(np.random.default_rng(11), 3000)
@@ -150,7 +152,7 @@ def test_stated_residual_is_what_other_points_find(terms, tmp_path):
     size = np.linalg.norm(expected, axis=1)
     errors = np.linalg.norm(formula(file, points, [1.0]) - expected, axis=1) / np.maximum(size, 0.01 * size.max())
     assert not done.exact and 0 < done.maximum <= 0.01
-    assert errors.max() <= 1.5 * done.maximum
+    assert errors.max() <= done.maximum
     assert np.sqrt(np.mean(errors**2)) == pytest.approx(done.rms, rel=0.5)
 
 
@@ -160,7 +162,7 @@ def test_loop_in_mag_manip_keeps_the_formula_on_its_axis(tmp_path):
     done = write_mpem(one_coil(loops(np.array([[0, 0, -0.1]]), 0.04, 1.0)), file)
     exact = MU_0 * 0.04**2 / 2 / (0.04**2 + (z + 0.1) ** 2) ** 1.5
     theirs = mag_manip.evaluate(file, np.stack([0 * z, 0 * z, z], axis=-1), [1.0])
-    np.testing.assert_allclose(theirs.B[:, 2], exact, rtol=1.5 * done.maximum)
+    np.testing.assert_allclose(theirs.B[:, 2], exact, rtol=done.maximum)
 
 
 def test_model_all_round_a_ring_magnet(tmp_path):
@@ -174,7 +176,7 @@ def test_model_all_round_a_ring_magnet(tmp_path):
     size = np.linalg.norm(expected, axis=-1)
     floor = np.maximum(size, 0.01 * size.max(axis=-1, keepdims=True))
     errors = np.linalg.norm(found - expected, axis=-1) / floor
-    assert errors.max() <= 1.5 * done.maximum and np.sqrt(np.mean(errors**2)) <= 1.5 * done.rms
+    assert errors.max() <= done.maximum and np.sqrt(np.mean(errors**2)) <= 1.2 * done.rms
 
 
 def test_sources_lie_outside_the_region(tmp_path):
@@ -189,13 +191,13 @@ def test_sources_lie_outside_the_region(tmp_path):
 
 
 def test_residual_above_the_tolerance_is_refused(tmp_path):
-    """A loop 1 mm in front of the workspace, 20 mm wide: no few multipoles do that."""
-    system, file = one_coil(loops(np.array([[0, 0, -0.0305]]), 0.02, 1.0)), tmp_path / "near.yaml"
-    with pytest.raises(ConvergenceError, match=r"Coil_a of one to .* of B at best, more than the tolerance of 1e-06"):
-        write_mpem(system, file, tolerance=1e-6)
+    """Nothing is written then, unless it is asked for."""
+    system, file = one_coil(loops(np.array([[0, 0, -0.1]]), 0.04, 1.0)), tmp_path / "loop.yaml"
+    with pytest.raises(ConvergenceError, match=r"Coil_a of one to .* of B at best, more than the tolerance of 1e-16"):
+        write_mpem(system, file, tolerance=1e-16)
     assert not file.exists()
-    done = write_mpem(system, file, tolerance=1e-6, strict=False)
-    assert done.maximum > 1e-6 and f"{done.maximum:.2%}" in file.read_text()
+    done = write_mpem(system, file, tolerance=1e-16, strict=False)
+    assert done.maximum > 1e-16 and f"{done.maximum:.1e}" in file.read_text()
 
 
 def test_every_coil_states_its_own_residual(tmp_path, caplog):
@@ -208,7 +210,7 @@ def test_every_coil_states_its_own_residual(tmp_path, caplog):
         done = write_mpem(system, tmp_path / "two.yaml")
     assert list(done.residuals) == ["Coil_0", "Coil_1"]  # names of the usual form, which theirs are not
     assert done.residuals["Coil_0"] == (0.0, 0.0) and done.residuals["Coil_1"] == (done.maximum, done.rms)
-    assert re.search(r"mpem: \d+ sources, residual of B at most", caplog.text)
+    assert re.search(r"mpem: \d+ sources, fitted, relative error of B at most", caplog.text)
 
 
 # The file
@@ -249,3 +251,19 @@ def test_what_cannot_be_written_is_refused(tmp_path):
             write_mpem(nothing, file)
     with pytest.raises(InputError, match="cannot write"):
         write_mpem(everywhere, tmp_path / "none" / "coil.yaml", workspace=BALL)
+
+
+# The command
+
+
+def test_command_writes_what_the_function_writes(tmp_path, capsys):
+    file, own = tmp_path / "ring.yaml", tmp_path / "own.yaml"
+    bounds = "-1 mm, 1 mm, -1 mm, 1 mm, 2 mm, 4 mm"
+    line = ["export", "ring_magnet_4x1.5x1", "--to", "mpem", "-o", str(file), "--bounds", bounds, "--json"]
+    assert main(line) == 0
+    shown = json.loads(capsys.readouterr().out)
+    done = write_mpem(magfem.load_model("ring_magnet_4x1.5x1"), own, Box((-1e-3, -1e-3, 2e-3), (1e-3, 1e-3, 4e-3)))
+    assert file.read_bytes() == own.read_bytes()
+    assert shown["residual"] == {"max": done.maximum, "rms": done.rms} and not shown["exact"]
+    assert main([*line, "--tolerance", "0.5"]) == 0
+    assert json.loads(capsys.readouterr().out)["sources"] < shown["sources"]

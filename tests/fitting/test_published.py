@@ -65,9 +65,8 @@ name = "one pole"
 source = "nobody"
 coefficients = [1e-7]
 [region]
-body = "1 mm"
-clearance = "10 mm"
-extent = "90 mm"
+centre = ["0 mm", "0 mm", "50 mm"]
+radius = "40 mm"
 [bound]
 B = 0.1
 gradient = 0.2
@@ -92,8 +91,8 @@ def test_smallest_recipe(tmp_path):
         ("[1e-7]", '["1e-7"]', "list of numbers a_k"),
         ("[1e-7]", "[inf]", "finite, 80 at most"),
         ("[1e-7]", str([1.0] * 81), "finite, 80 at most"),
-        ('"10 mm"', '"100 mm"', r"lower limits smaller than upper ones.*: region\]"),
-        ('"90 mm"', '"90 mm"\nz = ["1 mm"]', "z must be two lengths"),
+        ('"40 mm"', '"0 mm"', r"radius must be positive \[.*: region.radius\]"),
+        ('["0 mm", "0 mm", "50 mm"]', '["0 mm"]', "centre must be three lengths"),
         ("B = 0.1", "B = 0", r"relative error above 0 \[.*: bound.B\]"),
         ('ground = "none"', "", 'missing key "ground"'),
         ('source = "nobody"', 'sauce = "nobody"', 'unknown key "sauce"; did you mean "source"'),
