@@ -105,7 +105,9 @@ def test_degree_zero_is_a_layer_of_dipoles():
         rho = np.sqrt(1 - (0.5 + 0.5 * u) ** 2)
         phi = np.arange(2 * nodes) * np.pi / nodes
         disc = A * np.stack(np.broadcast_arrays(rho[:, None] * np.cos(phi), rho[:, None] * np.sin(phi), 0.0), axis=-1)
-        dipoles = np.broadcast_to((0.5 * weight * np.pi / nodes)[:, None], disc.shape[:2]).ravel() * 2 * A**3 / 4 / np.pi
+        dipoles = (
+            np.broadcast_to((0.5 * weight * np.pi / nodes)[:, None], disc.shape[:2]).ravel() * 2 * A**3 / 4 / np.pi
+        )
         d = points[:, None] - disc.reshape(-1, 3)
         r = np.linalg.norm(d, axis=-1, keepdims=True)
         fields = 3 * d[..., 2:] * d / r**5 - np.array([0, 0, 1]) / r**3
@@ -164,9 +166,7 @@ def test_the_field_jumps_across_the_disc_and_nowhere_else(degree, imaginary):
     term, above = single(degree, imaginary), 1e-10
     outside = cylindrical(np.array([1.05, 1.5, 4.0]), above)
     scale = [np.abs(part).max() for part in term.jet(A * cylindrical(1.05, 0.05), 2)]
-    for up, down, size in zip(
-        term.jet(A * outside, 2), term.jet(A * outside * [1, 1, -1], 2), scale, strict=True
-    ):
+    for up, down, size in zip(term.jet(A * outside, 2), term.jet(A * outside * [1, 1, -1], 2), scale, strict=True):
         assert np.abs(up - down).max() < 1e-6 * size
     inside = A * cylindrical(np.array([0.1, 0.5, 0.8]), above)
     jump = term.jet(inside, 0)[0] - term.jet(inside * [1, 1, -1], 0)[0]
