@@ -114,7 +114,7 @@ def test_concatenated_is_the_sum(points):
 
 
 def test_order_of_sources_and_runs_of_frames_do_not_matter(points):
-    """Sources in the common frame between tilted ones, frames that follow themselves: each sum is turned in its time."""
+    """Sources in the common frame between tilted ones, frames that follow themselves: sums are turned in time."""
     shuffled = [ALL.source(k) for k in np.random.default_rng(3).permutation(ALL.kind.size)]
     again = [one.placed(POSE).placed(POSE.inv()) if k % 2 else one for k, one in enumerate(shuffled)]
     truth = ALL.jet(points, 2)
