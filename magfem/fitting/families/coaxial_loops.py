@@ -63,8 +63,8 @@ def wall_and_face_loops(geometry: Geometry, region: Shell) -> Iterator[Candidate
 def winding_loops(geometry: Geometry, region: Shell) -> Iterator[Candidate]:
     """Coaxial loops at Gauss–Legendre points of the windows of windings about z; the fit finds their currents.
 
-    The first candidate has one loop for each clearance along the window and across it, or two, and each further one
-    1.3 times as many.
+    The first candidate has one loop for each clearance along the window, or two, and across it, and each further one
+    1.2 times as many.
     """
     windings = windings_of(geometry)
     density = 1.0
@@ -73,7 +73,7 @@ def winding_loops(geometry: Geometry, region: Shell) -> Iterator[Candidate]:
         for winding in windings:
             along = max(2, round(density * winding.length / region.clearance)) if winding.length else 1
             build = winding.outer_radius - winding.inner_radius
-            across = max(1, round(density * build / (2 * region.clearance))) if build else 1
+            across = max(2, round(density * build / (1.3 * region.clearance))) if build else 1
             z = winding.centre + gauss(along, -winding.length / 2, winding.length / 2)
             radius, height = np.meshgrid(gauss(across, winding.inner_radius, winding.outer_radius), z)
             radii.append(radius.ravel())
@@ -87,7 +87,7 @@ def winding_loops(geometry: Geometry, region: Shell) -> Iterator[Candidate]:
             f"{across} × {along} loops in the window{each}",
             loops(np.concatenate(centres), placed, np.ones(placed.size)),
         )
-        density *= 1.3
+        density *= 1.2
 
 
 def windings_of(geometry: Geometry) -> list[CoaxialWinding]:
