@@ -67,7 +67,7 @@ def winding_loops(geometry: Geometry, region: Shell) -> Iterator[Candidate]:
     1.2 times as many.
     """
     windings = windings_of(geometry)
-    density = 1.0
+    density, before = 1.0, 0
     while True:
         centres, radii = [], []
         for winding in windings:
@@ -81,13 +81,16 @@ def winding_loops(geometry: Geometry, region: Shell) -> Iterator[Candidate]:
         placed = np.concatenate(radii)
         if placed.size > MOST_PARAMETERS or density > 40:
             return
+        density *= 1.2
+        if placed.size == before:
+            continue
+        before = placed.size
         each = "" if len(windings) == 1 else f" of each of {len(windings)} windings"
         yield independent(
             "winding_loops",
             f"{across} × {along} loops in the window{each}",
             loops(np.concatenate(centres), placed, np.ones(placed.size)),
         )
-        density *= 1.2
 
 
 def windings_of(geometry: Geometry) -> list[CoaxialWinding]:
