@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass, field
 from functools import cached_property
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform
@@ -73,7 +75,7 @@ class CoilSystem:
     """Coils in one frame, whose fields add up.
 
     background: sources whose field (T) is there whatever the currents.  workspace: where the system is used.
-    source: where its numbers come from.
+    source: where its numbers come from.  report, provenance: what a calibration found out about itself, and of what.
 
     Points are (..., 3) m in the system's frame, currents (c,) A, or (..., c) for currents of their own at every
     point: leading axes broadcast. `joints` are for coils that move; these are fixed, and it is None or empty.
@@ -85,6 +87,8 @@ class CoilSystem:
     background: Terms | None = None
     workspace: Region = field(default_factory=Everywhere)
     source: str = ""
+    report: dict[str, Any] = field(default_factory=dict)
+    provenance: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not self.coils and self.background is None:
@@ -211,6 +215,12 @@ class CoilSystem:
                 f"{format_quantity(self.coils[k].current_limit or 0.0, 'current')}, got {worst:.6g} A"
             )
         return amperes
+
+    def save(self, path: str | Path) -> None:
+        """Write the system file, whole or not at all."""
+        from magfem.actuation.system_file import write_system
+
+        write_system(self, Path(path))
 
     @cached_property
     def _limits(self) -> Floats:

@@ -27,7 +27,8 @@ class LeastSquares:
 
     parameters: (p,).  covariance: (p, p) for residuals of variance `variance`.  condition: of the scaled columns, with
     the ridge.  variance: |r|²/(n − effective), of one row, or what was given as known.  effective: γ.  ridge: λ.
-    residual: (n,).  basis: (n, p) the columns of U, singular: (p,) s, of the scaled columns.
+    residual: (n,).  basis: (n, p) the columns of U, singular: (p,) s, of the scaled columns.  preimage: (p, p), the
+    parameters that every column of U stands for: A · preimage = U.
     """
 
     parameters: Floats
@@ -39,6 +40,7 @@ class LeastSquares:
     residual: Floats
     basis: Floats
     singular: Floats
+    preimage: Floats
 
     @property
     def leave_one_out(self) -> Floats:
@@ -46,6 +48,18 @@ class LeastSquares:
         leverage = np.minimum((self.basis**2) @ (self.singular**2 / (self.singular**2 + self.ridge)), 1.0 - 1e-12)
         left_out: Floats = self.residual / (1.0 - leverage)
         return left_out
+
+    def parameters_without(self, out: Booleans) -> Floats:
+        """The parameters (p,) had the rows `out` (n,) not been fitted: what these pulled is taken back.
+
+        x − M_o (1 − H_o)⁻¹ r_o, with M_o the part of the solution operator that acts on them and H_o their leverages.
+        """
+        own = self.basis[out]
+        kept = self.singular**2 / (self.singular**2 + self.ridge)
+        remaining = (1.0 + 1e-12) * np.eye(len(own)) - (own * kept) @ own.T
+        pull = linalg.solve(remaining, self.residual[out], assume_a="pos")
+        changed: Floats = self.parameters - self.preimage @ (kept * (own.T @ pull))
+        return changed
 
     def without(self, target: Floats, out: Booleans) -> Floats:
         """The residuals of the rows `out` (n,) had these not been fitted: a small system, no new decomposition.
@@ -65,10 +79,12 @@ def solve_least_squares(
     ridge: Ridge = "none",
     variance: float | None = None,
     most_condition: float = math.inf,
+    rows: int | None = None,
 ) -> LeastSquares:
     """Minimise |matrix·x − target|, matrix (n, p), target (n,), by the singular values of the scaled columns.
 
     variance: of the rows, where it is known.  most_condition: the ridge is at least what keeps the condition below.
+    rows: how many there were, where `matrix` holds the triangles that they were reduced to.
     Nothing is truncated: what the data cannot tell shows in the condition, not in a silent zero. Columns of zeros get
     parameters of zero.
     """
@@ -81,7 +97,7 @@ def solve_least_squares(
     u = q @ small
     projected = u.T @ target
     outside = max(float(target @ target - projected @ projected), 0.0)
-    rows = len(matrix)
+    rows = len(matrix) if rows is None else rows
     chosen = 0.0
     if ridge == "evidence":
         chosen = _most_evident(s, projected, outside, rows, variance)
@@ -106,6 +122,7 @@ def solve_least_squares(
         residual=residual,
         basis=u,
         singular=s,
+        preimage=vt.T / s / scale[:, None],
     )
 
 
