@@ -1,8 +1,19 @@
 """Coil systems: fitted coil models in their places, from currents to the field."""
 
+from magfem.actuation.calibration import Calibration, calibrate
 from magfem.actuation.coil_system import CoilSystem, SystemCoil, SystemField
 from magfem.actuation.load import load_system
 from magfem.actuation.mpem import read_mpem
 from magfem.actuation.mpem_export import MpemExport, write_mpem
 
-__all__ = ["CoilSystem", "MpemExport", "SystemCoil", "SystemField", "load_system", "read_mpem", "write_mpem"]
+__all__ = [
+    "Calibration",
+    "CoilSystem",
+    "MpemExport",
+    "SystemCoil",
+    "SystemField",
+    "calibrate",
+    "load_system",
+    "read_mpem",
+    "write_mpem",
+]

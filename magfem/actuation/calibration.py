@@ -4,9 +4,9 @@
 
 with φ_k interior solid harmonics about the middle of the workspace, so that every coil's field is free of sources
 there, and the background is what a probe shows without currents (the `Offset` of MPEM files). Or with the models of a
-system that is known beforehand, a gain for each coil, and harmonics for what they leave. Linear least squares in all
-coefficients; the degree is the smallest that predicts parts of space that were left out as well as the best does, within
-one standard error.
+system that is known beforehand, a gain for each coil, and harmonics for what they leave. All coefficients are found by
+one linear least squares; the degree is the smallest that predicts parts of space that were left out as well as the best
+does, within one standard error.
 """
 
 from __future__ import annotations
@@ -250,7 +250,9 @@ def _sum(first: Terms | None, second: Terms | None) -> Terms:
 def _tell(report: dict[str, Any]) -> None:
     """The result in a line, and what to beware of."""
     rms = report["heldout"]["B"]["absolute_rms"]
-    log.info("calibrate: %s, %d parameters, held-out residual %.2g mT", report["label"], report["parameters"], 1e3 * rms)
+    log.info(
+        "calibrate: %s, %d parameters, held-out residual %.2g mT", report["label"], report["parameters"], 1e3 * rms
+    )
     if report["uncertainty"]["bias_dominates"]:
         log.warning("calibrate: the model's own error is larger than the noise: deviations say too little")
     for coil in report["saturation"]["saturates"]:

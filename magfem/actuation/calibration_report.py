@@ -33,7 +33,10 @@ def calibration_report(
     chosen: CurrentFit,
     target: Floats,
 ) -> dict[str, Any]:
-    """All of it. positions: (q, 3) m.  place: (n,) of every sample.  target: (n, 3) T, what the chosen fit was fitted to."""
+    """All of it.
+
+    positions: (q, 3) m.  place: (n,) of every sample.  target: (n, 3) T, what harmonics were fitted to.
+    """
     solved, design = chosen.solved, chosen.design
     parameters = chosen.table.ravel()
     residual = (samples.B if chosen.degree == 0 else target) - design.field(parameters)

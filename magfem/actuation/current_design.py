@@ -2,10 +2,10 @@
 
     B(p, I) = Σ_j I_j Σ_k c_jk φ_k(p) + Σ_k b_k φ_k(p)
 
-With d = (I_1, …, I_c, 1) a row is φ(p) ⊗ d, and its parameters are X (K, c + 1): column j a coil's coefficients, the last
-one the background's. The rows are never held all at once. Orthogonal transformations keep sums of squares, so the rows
-of a part of space are reduced to one triangle, R of their QR decomposition; parameters are sorted by function first,
-so that the leading columns of the same triangles are the problem with fewer functions.
+With d = (I_1, …, I_c, 1) a row is φ(p) ⊗ d, and its parameters are X (K, c + 1): column j holds a coil's coefficients,
+the last one the background's. The rows are never held all at once. Orthogonal transformations keep sums of squares, so
+the rows of a part of space are reduced to one triangle, R of their QR decomposition; parameters are sorted by function
+first, so that the leading columns of the same triangles are the problem with fewer functions.
 """
 
 from __future__ import annotations
@@ -97,7 +97,7 @@ class Triangles:
 
 
 def reduced(design: CurrentDesign, B: Floats, part: Integers, picked: Integers | None = None) -> Triangles:
-    """The triangles of every part (n,) of the samples, 0 … , for values B (n, 3); of the parameters `picked`, or all."""
+    """The triangles of every part (n,) of the samples, for values B (n, 3) and all parameters, or those `picked`."""
     triangles = []
     for number in range(int(part.max()) + 1):
         own = np.flatnonzero(part == number)

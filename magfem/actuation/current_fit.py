@@ -88,10 +88,18 @@ def harmonic_units(top: int, radius: float, centre: Points) -> tuple[Terms, ...]
 
 def _joined(units: Sequence[Terms], coefficients: Floats) -> Terms:
     """Harmonics about one centre as one source."""
-    degree, order, sine = (np.concatenate([getattr(one, name) for one in units]) for name in ("degree", "order", "sine"))
+    degree, order, sine = (
+        np.concatenate([getattr(one, name) for one in units]) for name in ("degree", "order", "sine")
+    )
     first = units[0]
     return harmonics(
-        float(first.radius[0]), degree.tolist(), order.tolist(), sine.tolist(), coefficients, first.centre[0], kind=INTERIOR
+        float(first.radius[0]),
+        degree.tolist(),
+        order.tolist(),
+        sine.tolist(),
+        coefficients,
+        first.centre[0],
+        kind=INTERIOR,
     )
 
 
@@ -106,7 +114,8 @@ def fit_degrees(
 ) -> list[CurrentFit]:
     """Harmonics up to each of the degrees; one reduction serves all.
 
-    units: as `harmonic_units` gives them, the functions of the design.  B: (n, 3) T.  part: (n,) of space.  variance: of a weighted row, where it is known.
+    units: as `harmonic_units` gives them, the functions of the design.  B: (n, 3) T.  part: (n,) of space.
+    variance: of a weighted row, where it is known.
     """
     triangles = reduced(design, B, part)
     drives = design.drive.shape[1]

@@ -34,8 +34,8 @@ def check_samples(samples: SystemSamples, positions: Floats, names: Sequence[str
     where = f" [{samples.source}]" if samples.source else ""
     if len(positions) < FEWEST_PLACES:
         raise InputError(
-            f"{len(positions)} positions are too few for a calibration: {FEWEST_PLACES} or more are needed, spread over "
-            f"the workspace{where}"
+            f"{len(positions)} positions are too few for a calibration: {FEWEST_PLACES} or more are needed, spread "
+            f"over the workspace{where}"
         )
     spread = np.linalg.svd(positions - positions.mean(axis=0), compute_uv=False)
     if spread[1] < _THIN * spread[0]:
@@ -53,10 +53,12 @@ def _check_currents(currents: Floats, names: Sequence[str], where: str) -> None:
     length = np.linalg.norm(currents, axis=0)
     idle = [name for name, size in zip(names, length, strict=True) if size == 0]
     if idle:
-        raise InputError(f"{_listed(idle)} carried no current in any row: drive every coil, or leave its column out{where}")
+        raise InputError(
+            f"{_listed(idle)} carried no current in any row: drive every coil, or leave its column out{where}"
+        )
     scaled = currents / length
     cosine = np.abs(scaled.T @ scaled) - np.eye(len(names))
-    first, second = np.unravel_index(int(np.argmax(cosine)), cosine.shape)
+    first, second = (int(k) for k in np.unravel_index(int(np.argmax(cosine)), cosine.shape))
     if 1 - cosine[first, second] ** 2 < ALIKE**2:
         pair = _listed([names[min(first, second)], names[max(first, second)]])
         raise InputError(
@@ -73,7 +75,9 @@ def _check_currents(currents: Floats, names: Sequence[str], where: str) -> None:
 
 
 def _check_background(currents: Floats, names: Sequence[str], where: str) -> None:
-    scaled = np.column_stack([currents / np.linalg.norm(currents, axis=0), np.ones(len(currents)) / len(currents) ** 0.5])
+    scaled = np.column_stack(
+        [currents / np.linalg.norm(currents, axis=0), np.ones(len(currents)) / len(currents) ** 0.5]
+    )
     tied = _tied(scaled)
     if tied[-1]:
         group = _listed([name for name, one in zip(names, tied[:-1], strict=True) if one])

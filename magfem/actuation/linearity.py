@@ -24,7 +24,9 @@ SIGNIFICANT_LOSS = 0.005
 """Of a coil's field at its largest current: less is not called saturation."""
 
 _SIGMAS = 3.0
-_FEWEST = 30  # degrees of freedom (components) that a floor needs
+_FEWEST = 10  # degrees of freedom that local fits need to say something
+_JUDGED = 0.05  # of a row left free: the others have nearly a parameter of their own
+_ENOUGH = 0.5  # of all rows left free: then saturation is sought position by position
 _DISTINCT = 0.02  # of the cubic column: share that the linear model must leave for a loss to be told
 _ROUNDS = 3  # the fields per ampere that the cubic columns are made of settle at once
 _LINEAR = 0.01  # the loss that the stated currents keep below, three standard deviations included
@@ -32,40 +34,41 @@ _LINEAR = 0.01  # the loss that the stated currents keep below, three standard d
 
 @dataclass(frozen=True)
 class LocalFit:
-    """Residuals (m, 3) T of the fits at single positions, scaled to the deviation of one measurement; their rows (m,).
+    """What linear fits at single positions leave of values (n, m).
 
-    freedom: degrees of freedom, components.  variance: pooled, of one component, T².
+    rows: (r,) of the samples whose position was measured often enough, residual: (r, m) of them.  free: (r,) the share
+    of each row that no parameter took.
     """
 
-    residual: Floats
     rows: Integers
-    freedom: int
-    variance: float
+    residual: Floats
+    free: Floats
+
+    @property
+    def freedom(self) -> float:
+        """Degrees of freedom of one column."""
+        return float(self.free.sum())
 
 
-def local_fit(group: Integers, drive: Floats, B: Floats) -> LocalFit | None:
-    """Least squares of B (n, 3) against the drives (n, D) within every group (n,); None when too little is left over."""
+def local_fit(group: Integers, drive: Floats, values: Floats) -> LocalFit | None:
+    """Least squares of values (n, m) against the drives (n, D) within every group (n,); None when little is left."""
     order = np.argsort(group, kind="stable")
     bounds = np.flatnonzero(np.diff(group[order], prepend=-1, append=-2))
     counts = np.diff(bounds)
     scaled = drive / np.maximum(np.abs(drive).max(axis=0), 1e-300)
-    freedom, total = 0, 0.0
-    found: list[Floats] = []
-    of: list[Integers] = []
+    found: list[tuple[Integers, Floats, Floats]] = []
     for size in np.unique(counts[counts > 1]):
         rows = order[bounds[:-1][counts == size][:, None] + np.arange(size)]  # (k, size)
         u, s, _ = np.linalg.svd(scaled[rows], full_matrices=False)
         u = np.where((s > 1e-6 * s[:, :1])[:, None, :], u, 0.0)
+        residual = values[rows] - u @ (np.swapaxes(u, 1, 2) @ values[rows])
         free = 1.0 - np.sum(u**2, axis=2)
-        residual = B[rows] - u @ (np.swapaxes(u, 1, 2) @ B[rows])
-        freedom += 3 * int(round(float(free.sum())))
-        total += float(np.sum(residual**2))
-        judged = free > 0.05  # the others have nearly a parameter of their own
-        found.append(residual[judged] / np.sqrt(free[judged])[:, None])
-        of.append(rows[judged])
-    if freedom < _FEWEST:
+        found.append((rows.ravel(), residual.reshape(rows.size, -1), free.ravel()))
+    if not found:
         return None
-    return LocalFit(np.concatenate(found), np.concatenate(of), freedom, total / freedom)
+    rows, residual, free = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    fit = LocalFit(rows, residual, free)
+    return fit if fit.freedom >= _FEWEST else None
 
 
 def repeated_noise(place: Integers, currents: Floats, B: Floats) -> float | None:
@@ -74,7 +77,7 @@ def repeated_noise(place: Integers, currents: Floats, B: Floats) -> float | None
     keys = np.column_stack([place, np.round(currents / step)])
     group = np.unique(keys, axis=0, return_inverse=True)[1].reshape(-1)
     local = local_fit(group, np.ones((len(B), 1)), B)
-    return None if local is None else float(np.sqrt(local.variance))
+    return None if local is None else float(np.sqrt(np.sum(local.residual**2) / (3 * local.freedom)))
 
 
 def linearity_floor(
@@ -83,21 +86,23 @@ def linearity_floor(
     """What is not linear in the currents, of measurements B (n, 3) T at their places (n,) and drives (n, D).
 
     residual: (n, 3) T of the calibration, with its degrees of freedom, for want of positions measured often enough.
-    noise: of a component, T, where it is known apart from any model.
+    noise: of a component, T, where it is known apart from any model. Returns |ΔB| in T and relative to |B|.
     """
     local = local_fit(place, drive, B)
     if local is None:
         shown, rows, degrees = residual, np.arange(len(B)), freedom
-        variance = float(np.sum(residual**2)) / max(freedom, 1.0)
     else:
-        shown, rows, variance, degrees = local.residual, local.rows, local.variance, float(local.freedom)
+        judged = local.free > _JUDGED
+        rows, degrees = local.rows[judged], 3 * local.freedom
+        shown = local.residual[judged] / np.sqrt(local.free[judged])[:, None]  # as one measurement deviates
+    total = float(np.sum((residual if local is None else local.residual) ** 2))
+    variance = total / max(degrees, 1.0)
     relative = relative_errors(B[rows] + shown, B[rows], layered=False)
-    size = np.linalg.norm(shown, axis=1)
     floor: dict[str, Any] = {
         "from": "the calibration's residual" if local is None else "positions measured more than once",
         "rows": len(rows),
         "rms": float(np.sqrt(3 * variance)),
-        "max": float(size.max()),
+        "max": float(np.linalg.norm(shown, axis=1).max()),
         "relative_rms": float(np.sqrt(np.mean(relative**2))),
         "relative_max": float(relative.max()),
         "noise": None if noise is None else float(np.sqrt(3)) * noise,
@@ -107,7 +112,7 @@ def linearity_floor(
     if noise is not None:
         floor["beyond_noise"] = float(np.sqrt(max(3 * (variance - noise**2), 0.0)))
         # The pooled variance has the relative deviation √(2/ν).
-        floor["significant"] = bool(variance > noise**2 * (1 + _SIGMAS * np.sqrt(2 / degrees)))
+        floor["significant"] = bool(variance > noise**2 * (1 + _SIGMAS * np.sqrt(2 / max(degrees, 1.0))))
     return floor
 
 
@@ -124,27 +129,38 @@ def saturation(
 
     per_ampere: (n, 3, C) T/A at the samples and residual: (n, 3) T, of the linear fit.  inverse: (p, p) of its normal
     matrix.  known_variance: of the weighted rows.  effective: how many parameters the data decided.
+
+    Where most positions were measured often enough, what is linear there is taken away position by position, which
+    needs no model of space; else by the calibration, whose own error then adds to the deviations.
     """
     coils = len(names)
     currents = design.drive[:, :coils]
     largest = np.abs(currents).max(axis=0)
     cube = largest * (currents / largest) ** 3  # A: the factor is then the loss at the largest current
     functions = len(inverse) // design.drive.shape[1]
-    target = (residual * design.weight).ravel()
+    local = local_fit(design.place, design.drive, residual)
+    by_position = local is not None and 3 * local.freedom >= _ENOUGH * residual.size
+    freedom = 3 * local.freedom if local is not None and by_position else residual.size - effective
+    target = local.residual.ravel() if local is not None and by_position else (residual * design.weight).ravel()
     at_small_currents, factors, deviation = per_ampere, np.zeros(coils), np.full(coils, np.nan)
     for _ in range(_ROUNDS):
         columns = -at_small_currents * cube[:, None, :]
         carried = inverse @ design.adjoint(columns, functions)  # (p, C), what the linear model makes of them
-        left = columns - np.stack([design.field(one) for one in carried.T], axis=-1)
-        weighted = (left * design.weight[..., None]).reshape(-1, coils)
-        size = np.linalg.norm((columns * design.weight[..., None]).reshape(-1, coils), axis=0)
-        told, normal = _told(weighted, size)
+        if local is not None and by_position:
+            alone = local_fit(design.place, design.drive, columns.reshape(len(columns), -1))
+            assert alone is not None
+            left, whole = alone.residual.reshape(-1, coils), columns[alone.rows].reshape(-1, coils)
+        else:
+            modelled = np.stack([design.field(one) for one in carried.T], axis=-1)
+            left, whole = ((one * design.weight[..., None]).reshape(-1, coils) for one in (columns - modelled, columns))
+        told, normal = _told(left, np.linalg.norm(whole, axis=0))
         factors = np.zeros(coils)
-        factors[told] = normal @ (weighted[:, told].T @ target)
+        factors[told] = normal @ (left[:, told].T @ target)
         at_small_currents = per_ampere - design.per_ampere(carried @ factors)[..., :coils]
-        rest = target - weighted @ factors
-        spread = float(rest @ rest) / max(rest.size - effective - int(told.sum()), 1.0)
-        variance = spread if known_variance is None else known_variance
+        rest = target - left @ factors
+        variance = float(rest @ rest) / max(freedom - int(told.sum()), 1.0)
+        if not by_position:
+            variance = max(variance, known_variance or 0.0)
         deviation = np.full(coils, np.nan)
         deviation[told] = np.sqrt(variance * np.diag(normal))
     found = zip(names, largest.tolist(), factors.tolist(), deviation.tolist(), strict=True)
@@ -154,9 +170,9 @@ def saturation(
 
 def _told(columns: Floats, size: Floats) -> tuple[Booleans, Floats]:
     """Which columns (m, C) the linear model and the others leave enough of, and the inverse of their normal matrix."""
-    told = np.linalg.norm(columns, axis=0) > _DISTINCT * size
+    told: Booleans = np.asarray(np.linalg.norm(columns, axis=0) > _DISTINCT * size)
     while told.any():
-        normal = np.linalg.pinv(columns[:, told].T @ columns[:, told], hermitian=True)
+        normal = np.asarray(np.linalg.pinv(columns[:, told].T @ columns[:, told], hermitian=True), dtype=float)
         alone = np.diag(normal) * (_DISTINCT * size[told]) ** 2 < 1.0
         if alone.all():
             return told, normal

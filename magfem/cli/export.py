@@ -17,6 +17,7 @@ from magfem.errors import InputError
 from magfem.units import quantity, quoted
 
 if TYPE_CHECKING:
+    from magfem.actuation import CoilSystem
     from magfem.fields import Field
     from magfem.typing import Points
 
@@ -56,7 +57,7 @@ def add(commands: CommandLine) -> None:
             "magfem export ring.json --to samples -o ring.csv --points points.csv --gradient",
         ],
     )
-    parser.add_argument("model", metavar="MODEL", help="field model: a name or a path")
+    parser.add_argument("model", metavar="MODEL", help="field model: a name or a path; mpem: also a coil system's file")
     parser.add_argument("--to", choices=tuple(TARGETS), required=True, help="the other program")
     parser.add_argument("-o", "--output", metavar="FILE", required=True, help="the file to write")
     parser.add_argument("--current", metavar="A", type=float, help="a coil's current in A: the export is then in T")
@@ -77,6 +78,8 @@ def run(options: Namespace) -> int:
     target = TARGETS[options.to]
     path = output_file(options.output, [target.ending])
     _check_options(options, target)
+    if _is_system(options.model):
+        return _export_system(options, path)
     from magfem.fitting import load_model
 
     model = load_model(options.model)
@@ -87,6 +90,32 @@ def run(options: Namespace) -> int:
     data = {"output": str(path), "to": options.to, "name": model.name, "unit": field.unit, **more}
     files = [str(path), *more.get("beside", [])]
     show_result(options, f"{model.name}, in {field.unit}, for {options.to}: {', '.join(files)}", data)
+    return 0
+
+
+def _is_system(name: str) -> bool:
+    """Whether a path is that of a coil system rather than of a model."""
+    from magfem.actuation.system_file import is_system_file
+
+    path = Path(name)
+    return path.suffix in (".toml", ".yaml", ".yml") or (path.suffix == ".json" and is_system_file(path))
+
+
+def _export_system(options: Namespace, path: Path) -> int:
+    """All coils of a system, and its background."""
+    if options.to != "mpem":
+        raise InputError(
+            f"a coil system is exported to mpem; for {options.to} export the models of its coils, got "
+            f"{quoted(options.model)}"
+        )
+    if options.current is not None:
+        raise InputError("--current is for the model of one coil: a system stays per ampere")
+    from magfem.actuation import load_system
+
+    system = load_system(options.model)
+    more = _mpem(system, path, options)
+    data = {"output": str(path), "to": options.to, "name": system.name, "unit": "T/A", **more}
+    show_result(options, f"{system.name}, {len(system.coils)} coils in T/A, for {options.to}: {path}", data)
     return 0
 
 
@@ -136,7 +165,7 @@ def _c(field: Field, path: Path, options: Namespace) -> dict[str, Any]:
     return {"function": f"{name}_field"}
 
 
-def _mpem(field: Field, path: Path, options: Namespace) -> dict[str, Any]:
+def _mpem(field: Field | CoilSystem, path: Path, options: Namespace) -> dict[str, Any]:
     from magfem.actuation.mpem_export import TOLERANCE, write_mpem
     from magfem.fields.workspace_region import Box
 

@@ -14,6 +14,7 @@ from magfem.units import format_quantity, quantity, quoted
 
 if TYPE_CHECKING:
     from magfem.fitting import FieldModel, Recipe
+    from magfem.samples import Samples, SystemSamples
 
 
 def add(commands: CommandLine) -> None:
@@ -25,13 +26,15 @@ def add(commands: CommandLine) -> None:
         "Solves a device, fits a field model to the solution and writes the model file; or fits one to measured\n"
         "samples. The table holds the model's relative errors at points that the fit has not seen, next to those of\n"
         "the dissertation's families on the same data. A name is a fit recipe if there is one, else a device card.\n"
-        "Samples of a coil system (px,py,pz,i0,...,bx,by,bz) make a system file. What else a fit of samples can\n"
-        "do (turned sensors, background, robust loss) is for recipes.",
+        "Samples of a coil system (px,py,pz,i0,...,bx,by,bz) make a system file: every coil per ampere, background,\n"
+        "linearity, saturation. What else a fit of samples can do (turned sensors, background, robust loss) is for\n"
+        "recipes.",
         [
             "magfem fit ring_magnet_4x1.5x1",
             "magfem fit ring_magnet_4x1.5x1 -o ring.json --resolution 2",
             "magfem fit ./my_recipe.toml -o mine.json",
             "magfem fit samples.csv -o field.json --sigma '0.1 mT'",
+            "magfem fit system.csv -o system.json",
             "magfem fit scan.csv --device disc_magnet_8x2 --column x=-magnet_x_mm --column 'y==0 mm' -o scan.json",
         ],
     )
@@ -42,13 +45,21 @@ def add(commands: CommandLine) -> None:
     parser.add_argument("--circuit", metavar="NAME", help="of a coil with several circuits")
     parser.add_argument("--family", metavar="NAME", help='of models, or "search" (default: what suits the device)')
     samples = parser.add_argument_group("samples")
-    samples.add_argument("--device", metavar="CARD", help="whose samples they are")
+    samples.add_argument("--device", metavar="CARD", help="whose samples they are; not for coil systems")
     samples.add_argument("--column", metavar="NAME=COLUMN", action="append", help="what stands for x, y, z, Bx, ...")
     samples.add_argument("--sigma", metavar="QUANTITY", help="standard deviation of every component, such as '0.1 mT'")
 
 
 def run(options: Namespace) -> int:
     """Solve or read, fit, write, print the errors."""
+    if _is_samples(options.target):
+        from magfem.samples import SystemSamples
+
+        samples = _read(options)
+        if isinstance(samples, SystemSamples):
+            from magfem.cli.fit_system import fit_system
+
+            return fit_system(samples, options)
     name = Path(options.target).name.removesuffix(".toml").removesuffix(".csv")
     path = output_file(options.output or f"{name}.json", [".json"])
     from magfem.fitting import model_from_recipe
@@ -70,7 +81,7 @@ def _recipe(options: Namespace) -> Recipe | str | Path:
     from magfem.geometry.catalogue import is_path, names
 
     target, choices = options.target, {"circuit": options.circuit, "family": options.family}
-    if target.lower().endswith((".csv", ".txt")):
+    if _is_samples(target):
         return _samples_recipe(options)
     for option in ("device", "column", "sigma"):
         if getattr(options, option):
@@ -87,17 +98,30 @@ def _recipe(options: Namespace) -> Recipe | str | Path:
     return target if not is_path(target, ".toml") else Path(target)
 
 
+def _is_samples(target: str) -> bool:
+    return target.lower().endswith((".csv", ".txt"))
+
+
+def _read(options: Namespace) -> Samples | SystemSamples:
+    from magfem.samples import parse_columns, read_samples
+
+    return read_samples(options.target, parse_columns(options.column or []), _sigma(options))
+
+
+def _sigma(options: Namespace) -> float | None:
+    return quantity(options.sigma, "flux density") if options.sigma else None
+
+
 def _samples_recipe(options: Namespace) -> Recipe:
     from magfem.fitting.recipe import Recipe, SamplesFile
     from magfem.geometry import load_geometry
     from magfem.samples import parse_columns
 
-    sigma = quantity(options.sigma, "flux density") if options.sigma else None
     return Recipe(
         geometry=load_geometry(options.device) if options.device else None,
         family=options.family,
         circuit=options.circuit,
-        samples=SamplesFile(Path(options.target), parse_columns(options.column or []), sigma),
+        samples=SamplesFile(Path(options.target), parse_columns(options.column or []), _sigma(options)),
     )
 
 

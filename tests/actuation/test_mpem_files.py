@@ -235,8 +235,8 @@ def test_files_that_are_none(tmp_path):
     (tmp_path / "latin.yml").write_bytes("System_Name: Größe".encode("latin-1"))
     with pytest.raises(CardError, match="not UTF-8"):
         magfem.load_system(tmp_path / "latin.yml")
-    with pytest.raises(InputError, match=r"a card \(.toml\) or an MPEM file \(.yaml\)"):
-        magfem.load_system(tmp_path / "system.json")
+    with pytest.raises(InputError, match=r"a card \(.toml\), a system file \(.json\) or an MPEM file \(.yaml\)"):
+        magfem.load_system(tmp_path / "system.txt")
     with pytest.raises(InputError, match='unknown coil system "octomagg"; the nearest is "octomag"'):
         magfem.load_system("octomagg")
     with pytest.raises(InputError, match="takes a name or path"):

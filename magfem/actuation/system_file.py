@@ -1,0 +1,149 @@
+"""System files: a coil system with all its terms in one JSON file, complete in itself.
+
+format, version     "magfem-system", 1
+name, source        texts
+coils               name, terms (as in model files), region; pose (position m, quaternion, scalar last) unless it is
+                    the identity; current_limit (A) if there is one
+background          terms in T, or null
+workspace           a region
+report, provenance  tables: what a calibration found out about itself, and of what
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from magfem.actuation.coil_system import CoilSystem, SystemCoil
+from magfem.errors import CardError, InputError
+from magfem.fields.region_json import region_from_dict, region_to_dict
+from magfem.fields.terms_json import number, numbers, terms_from_list, terms_to_list
+from magfem.files import read_json, write_json
+from magfem.units import describe, one_line
+
+FORMAT, VERSION = "magfem-system", 1
+
+_KEYS = ("format", "version", "name", "source", "coils", "background", "workspace", "report", "provenance")
+_COIL_KEYS, _COIL_CHOICES = ("name", "terms", "region"), ("pose", "current_limit")
+_WRONG = (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError, InputError)
+
+
+def write_system(system: CoilSystem, path: Path) -> None:
+    """Write the system file, whole or not at all. Every float keeps its bits, but for a pose's, which may round."""
+    write_json(path, system_to_dict(system))
+
+
+def system_to_dict(system: CoilSystem) -> dict[str, Any]:
+    """The content of the system file."""
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "name": system.name,
+        "source": system.source,
+        "coils": [_coil_to_dict(coil) for coil in system.coils],
+        "background": None if system.background is None else terms_to_list(system.background),
+        "workspace": region_to_dict(system.workspace),
+        "report": system.report,
+        "provenance": system.provenance,
+    }
+
+
+def is_system_file(path: Path) -> bool:
+    """Whether a JSON file says that it holds a system; false also for what is no JSON."""
+    try:
+        data = read_json(path, "the file")
+    except InputError:
+        return False
+    return isinstance(data, dict) and data.get("format") == FORMAT
+
+
+def read_system(file: Path, shown: str) -> CoilSystem:
+    """The system of a file; `shown` is how messages name it. Raises InputError, or CardError (file and key)."""
+    data = read_json(file, "the coil system")
+    if not isinstance(data, dict) or data.get("format") != FORMAT:
+        raise CardError(f'this is not a coil system: "format" must be "{FORMAT}"', f"{shown}: format")
+    if data.get("version") != VERSION:
+        raise CardError(
+            f"version {data.get('version')!r} of the format is not known, expected {VERSION}", f"{shown}: version"
+        )
+    key = ""
+    try:
+        _only(data, _KEYS)
+        for key, kind, words in (
+            ("name", str, "a text"),
+            ("source", str, "a text"),
+            ("coils", list, "a list of tables"),
+            ("report", dict, "a table"),
+            ("provenance", dict, "a table"),
+        ):
+            if not isinstance(data[key], kind):
+                raise ValueError(words)
+        coils = []
+        for k, entry in enumerate(data["coils"]):
+            key = f"coils[{k}]"
+            coils.append(_coil_from_dict(entry))
+        key = "background"
+        background = None if data["background"] is None else terms_from_list(data["background"])
+        key = "workspace"
+        workspace = region_from_dict(data["workspace"])
+        key = "coils"
+        return CoilSystem(
+            data["name"], tuple(coils), background, workspace, data["source"], data["report"], data["provenance"]
+        )
+    except _WRONG as error:
+        reason = f"{key} is not laid out as in a system file"
+        if isinstance(error, KeyError):
+            reason = f"missing key {error}"
+        elif isinstance(error, InputError):
+            reason = str(error)
+        elif isinstance(error, ValueError):
+            reason = f"expected {error}"
+        where = f"{shown}: {key}" if key else shown
+        raise CardError(f"not a whole coil system: {one_line(reason)}", where) from None
+
+
+def _coil_to_dict(coil: SystemCoil) -> dict[str, Any]:
+    entry: dict[str, Any] = {
+        "name": coil.name,
+        "terms": terms_to_list(coil.own_terms),
+        "region": region_to_dict(coil.own_region),
+    }
+    rotation, position = coil.pose.rotation, coil.pose.translation
+    if np.any(position != 0) or np.any(rotation.as_matrix() != np.eye(3)):
+        entry["pose"] = {"position": position.tolist(), "quaternion": rotation.as_quat().tolist()}
+    if coil.current_limit is not None:
+        entry["current_limit"] = coil.current_limit
+    return entry
+
+
+def _coil_from_dict(entry: Any) -> SystemCoil:
+    if not isinstance(entry, dict):
+        raise ValueError("a table for every coil")
+    _only(entry, _COIL_KEYS, _COIL_CHOICES)
+    if not isinstance(entry["name"], str):
+        raise ValueError(f"a text as name, got {describe(entry['name'])}")
+    limit = number(entry["current_limit"]) if "current_limit" in entry else None
+    pose = _pose(entry["pose"]) if "pose" in entry else RigidTransform.identity()
+    return SystemCoil(entry["name"], terms_from_list(entry["terms"]), region_from_dict(entry["region"]), pose, limit)
+
+
+def _pose(entry: Any) -> RigidTransform:
+    if not isinstance(entry, dict):
+        raise ValueError("a pose of position and quaternion")
+    _only(entry, ("position", "quaternion"))
+    position, quaternion = numbers(entry["position"]), numbers(entry["quaternion"])
+    if position.shape != (3,) or quaternion.shape != (4,) or abs(np.linalg.norm(quaternion) - 1) > 1e-9:
+        raise ValueError("a pose of a position of three numbers and a quaternion of length one, the scalar last")
+    return RigidTransform.from_components(position, Rotation.from_quat(quaternion))
+
+
+def _only(entry: dict[str, Any], keys: tuple[str, ...], choices: tuple[str, ...] = ()) -> None:
+    """KeyError for a key that is missing, ValueError for one that nobody knows."""
+    for key in keys:
+        entry[key]
+    unknown = sorted(set(entry) - {*keys, *choices})
+    if unknown:
+        raise ValueError(f"the keys {', '.join((*keys, *choices))}, got {describe(unknown[0])}")
