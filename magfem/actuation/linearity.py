@@ -153,7 +153,8 @@ def saturation(
         else:
             modelled = np.stack([design.field(one) for one in carried.T], axis=-1)
             left, whole = ((one * design.weight[..., None]).reshape(-1, coils) for one in (columns - modelled, columns))
-        told, normal = _told(left, np.linalg.norm(whole, axis=0))
+        enough = freedom - coils >= _FEWEST
+        told, normal = _told(left, np.linalg.norm(whole, axis=0) if enough else np.full(coils, np.inf))
         factors = np.zeros(coils)
         factors[told] = normal @ (left[:, told].T @ target)
         at_small_currents = per_ampere - design.per_ampere(carried @ factors)[..., :coils]

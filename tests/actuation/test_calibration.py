@@ -56,7 +56,7 @@ def test_errors_are_as_large_as_the_deviations_say():
     """95 % intervals of B at random points and currents: 90 to 99 %, averaged over seeds; noise stated or estimated."""
     inside = []
     for seed in range(6):
-        found = calibrate(octomag_samples(seed, per=6, sigma=NOISE if seed % 2 else None), degrees=(4, 5))
+        found = calibrate(octomag_samples(seed, per=4, sigma=NOISE if seed % 2 else None), degrees=4)
         for k in range(4):
             points, currents, _ = others(100 * seed + k, 40)
             truth = unit_fields(points) @ currents[0] + BACKGROUND
@@ -76,9 +76,9 @@ for _coil in TRUTH.values():
     _coil["s"] |= {"Source_Position": [0, 0, 0], "Source_Direction": [0, 0, 1]}
 
 
-def multipole_samples(seed, noise, per=2):
+def multipole_samples(seed, noise, per=4):
     rng = np.random.default_rng(seed)
-    points = np.repeat(GRID, per, axis=0)
+    points = np.repeat(grid(count=4), per, axis=0)  # none at the origin, where the formula divides by nothing
     currents = rng.uniform(-LARGEST, LARGEST, (len(points), 3))
     B = np.einsum("nac,nc->na", unit_fields(points, TRUTH, list("ABC")), currents) + BACKGROUND
     return SystemSamples(points, currents, B + rng.normal(scale=noise, size=B.shape) if noise else B)
@@ -108,9 +108,9 @@ def test_without_noise_the_coefficients_come_back():
 
 
 def test_coefficients_lie_where_their_deviations_say():
-    """95 % intervals of all coefficients: 90 to 99 %, over 30 seeds; the degree is found, not given."""
+    """95 % intervals of all coefficients: 90 to 99 %, over 16 seeds; the degree is found, not given."""
     inside, degrees = [], []
-    for seed in range(30):
+    for seed in range(16):
         found = calibrate(multipole_samples(seed, 100e-6))
         value, truth = coefficients(found)
         deviation = np.sqrt(np.diag(found.covariance)).reshape(value.shape)
@@ -121,12 +121,14 @@ def test_coefficients_lie_where_their_deviations_say():
 
 
 def test_noiseless_field_comes_back_as_far_as_harmonics_go():
-    """OctoMag is no finite sum of harmonics: 1e-6 of the largest field is what degree 10 leaves."""
-    found = calibrate(octomag_samples(3, per=4, noise=0.0))
+    """OctoMag is no finite sum of harmonics: degree 10 leaves 1e-6; found are smaller ones that predict as well."""
+    samples = octomag_samples(3, per=8, noise=0.0)
     points, currents, truth = others(4)
-    error = np.linalg.norm(found.system.B(points, currents) - truth, axis=1)
-    assert np.sqrt(np.mean(error**2)) < 2e-6 * np.linalg.norm(truth, axis=1).max()
-    assert found.report["degree"] == 10
+    for degrees, most in ((10, 1e-6), (None, 1e-5)):
+        found = calibrate(samples, degrees=degrees)
+        error = np.linalg.norm(found.system.B(points, currents) - truth, axis=1)
+        assert np.sqrt(np.mean(error**2)) < most * np.linalg.norm(truth, axis=1).max()
+    assert found.report["degree"] >= 7
 
 
 def test_background_is_found(calibrated):
@@ -172,7 +174,7 @@ def test_noise_of_rows_measured_twice_is_known_without_a_model():
 def test_order_of_the_rows_does_not_matter():
     samples = octomag_samples(8, per=3)
     shuffled = samples.subset(np.random.default_rng(0).permutation(samples.count))
-    first, second = calibrate(samples, degrees=3), calibrate(shuffled, degrees=3)
+    first, second = calibrate(samples, degrees=2), calibrate(shuffled, degrees=2)
     for one, other in zip(first.system.coils, second.system.coils, strict=True):
         scale = np.abs(one.terms.coefficient).max()
         np.testing.assert_allclose(other.terms.coefficient, one.terms.coefficient, atol=1e-10 * scale)
@@ -378,8 +380,8 @@ def test_positions_that_cannot_tell_the_field(points, complaint):
 
 def test_other_refusals(prior):
     samples = rows(drawn(free, free))
-    with pytest.raises(InputError, match="12 rows at 12 positions are too few for 8 coils and a background"):
-        calibrate(octomag_samples(1, per=1).subset(slice(0, 12)))
+    with pytest.raises(InputError, match="11 rows at 11 positions are too few for 8 coils and a background"):
+        calibrate(octomag_samples(1, per=1).subset(slice(0, 11)))
     with pytest.raises(InputError, match="B is zero in every row"):
         calibrate(replace(samples, B=np.zeros((250, 3))))
     with pytest.raises(InputError, match="currents of 2 coils, and 3 names"):
