@@ -17,6 +17,8 @@ QUANTITIES = ("B", "gradient")
 _APART = 0.1  # of the points' extent: worst points nearer to each other than this are one place
 _GROUPS = 12  # of distances
 _FEWEST = 4  # points that make a group
+_EDGE = 0.03  # of a region's extent: drawn points come as near as this to the limits of a window
+_ALIKE = 0.05  # distances that differ by less than this share are one
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +55,8 @@ class LocatedErrors:
         """Errors of groups of equally many points, nearest first: mean distance (m), largest error and RMS."""
         order = np.argsort(self.distance, kind="stable")
         groups = max(1, min(_GROUPS, order.size // _FEWEST))
+        if np.ptp(self.distance) < _ALIKE * self.distance.max():
+            groups = 1
         return [
             {"distance": float(self.distance[group].mean()), **LocatedErrors(*self._rows(group)).norms}
             for group in np.array_split(order, groups)
@@ -92,7 +96,13 @@ def bounds(region: SampledRegion) -> tuple[Floats, Floats]:
     if isinstance(region, Box):
         return np.array(region.low), np.array(region.high)
     points = region.layers(np.random.default_rng(6), 48, 96).reshape(-1, 3)
-    return points.min(axis=0), points.max(axis=0)
+    low, high = points.min(axis=0), points.max(axis=0)
+    if isinstance(region, Shell):  # its window, which random points hardly reach
+        slack = _EDGE * (high - low)
+        for axis, limits in enumerate(((-region.rho[1], region.rho[1]), (-region.rho[1], region.rho[1]), region.z)):
+            low[axis] = limits[0] if abs(low[axis] - limits[0]) < slack[axis] else low[axis]
+            high[axis] = limits[1] if abs(high[axis] - limits[1]) < slack[axis] else high[axis]
+    return low, high
 
 
 @dataclass(frozen=True, eq=False)
