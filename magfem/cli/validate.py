@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 from magfem.cli.console import listing, show_result, table
 from magfem.cli.outputs import output_file
 from magfem.cli.parser import CommandLine
+from magfem.cli.samples import add_samples_options, read_model_samples, refuse_samples_options
 from magfem.errors import CardError, InputError
-from magfem.units import format_quantity, quantity
+from magfem.units import format_quantity
 
 if TYPE_CHECKING:
     from magfem.fields import Field
@@ -47,8 +48,7 @@ def add(commands: CommandLine) -> None:
     )
     parser.add_argument("-o", "--output", metavar="MAP.png", help="a picture of the errors and where they are")
     samples = parser.add_argument_group("samples")
-    samples.add_argument("--column", metavar="NAME=COLUMN", action="append", help="what stands for x, y, z, Bx, ...")
-    samples.add_argument("--sigma", metavar="QUANTITY", help="standard deviation of every component, such as '0.1 mT'")
+    add_samples_options(samples)
     samples.add_argument(
         "--aligned",
         action=argparse.BooleanOptionalAction,
@@ -85,10 +85,8 @@ def _reference(model: FieldModel, options: Namespace) -> tuple[Field | Samples, 
         _check_device(model, shown)
         against = "fem"
     if against.lower().endswith((".csv", ".txt")):
-        return _samples(options), f"the samples {Path(against).name}"
-    for option in ("column", "sigma"):
-        if getattr(options, option):
-            raise InputError(f"--{option} is for samples: --against a file that ends in .csv or .txt")
+        return read_model_samples(against, options, "--against"), f"the samples {Path(against).name}"
+    refuse_samples_options(options, "--against")
     if options.aligned is not None:
         raise InputError("--aligned is for samples: --against a file that ends in .csv or .txt")
     if against not in ("exact", "fem"):
@@ -111,16 +109,6 @@ def _check_device(model: FieldModel, shown: str) -> None:
             f"this model comes from {what}, so samples are needed to validate it: --against SAMPLES.csv, "
             f"or another model [{shown}]"
         )
-
-
-def _samples(options: Namespace) -> Samples:
-    from magfem.samples import SystemSamples, parse_columns, read_samples
-
-    sigma = quantity(options.sigma, "flux density") if options.sigma else None
-    samples = read_samples(options.against, parse_columns(options.column or []), sigma)
-    if isinstance(samples, SystemSamples):
-        raise InputError(f"samples of a coil system are of no single model [{options.against}]")
-    return samples
 
 
 def _solved(model: FieldModel, shown: str, geometry: Geometry) -> tuple[Field, str]:

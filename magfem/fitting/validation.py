@@ -102,9 +102,7 @@ def _against_samples(model: FieldModel, residuals: SampleResiduals, name: str) -
         B["standardised"] = float(np.sqrt(np.mean(over**2)))
     gradient = model.gradient(residuals.points, outside="extrapolate")
     found = {"B": B, "gradient": None}
-    return _validation(
-        model, name, found, {"B": residuals.errors}, gradient, residuals.outside, residuals.aligned
-    )
+    return _validation(model, name, found, {"B": residuals.errors}, gradient, residuals.outside, residuals.aligned)
 
 
 def _validation(

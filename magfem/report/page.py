@@ -194,7 +194,9 @@ def _coefficient_rows(model: FieldModel) -> list[dict[str, Any]]:
             continue
         orders = term.get("orders", [0] * len(term["degrees"]))
         prefix = "" if kind == "harmonics" else f"{kind} "
-        for degree, order, part, value in zip(term["degrees"], orders, term["parts"], term["coefficients"], strict=True):
+        for degree, order, part, value in zip(
+            term["degrees"], orders, term["parts"], term["coefficients"], strict=True
+        ):
             what = f"{prefix}degree {degree}, order {order} {part}"
             rows.append({**place, "what": what, "value": value, "unit": "T"})
     return rows
@@ -283,7 +285,10 @@ def _python(subject: Subject) -> str:
     lines = [
         ("import magfem", ""),
         *get,
-        (f"B, gradient = model.jet({_inside(subject.model.region)})", f"m in; {subject.model.unit} and {_gradient_unit(subject.model)} out"),
+        (
+            f"B, gradient = model.jet({_inside(subject.model.region)})",
+            f"m in; {subject.model.unit} and {_gradient_unit(subject.model)} out",
+        ),
         ('B = model.B([[0, 0, 1]], outside="nan")', 'outside the region: "raise", "nan", "extrapolate"'),
     ]
     column = max(len(code) for code, comment in lines if comment) + 2
@@ -295,7 +300,7 @@ def _gradient_unit(model: FieldModel) -> str:
 
 
 def _inside(region: SampledRegion) -> str:
-    """A point of the region, as Python writes it: on the z axis if it meets it, whole millimetres where there are any."""
+    """A point of the region, as Python writes it: on the z axis if it meets it, in whole millimetres if possible."""
     low, high = bounds(region)
     height = np.linspace(max(float(low[2]), 0.0) if isinstance(region, Shell) else float(low[2]), float(high[2]), 20001)
     height = height[region.contains(np.stack([0 * height, 0 * height, height], axis=-1))]

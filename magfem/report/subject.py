@@ -10,8 +10,8 @@ from pathlib import Path
 from magfem.errors import InputError
 from magfem.fem import Solution, solve
 from magfem.fem.coil_solution import CoilSolution
-from magfem.fitting import FieldModel, fit, load_model
 from magfem.fields import Field
+from magfem.fitting import FieldModel, fit, load_model
 from magfem.geometry import Coil, Geometry, Magnets, geometry_from_text, load_geometry
 from magfem.geometry.card import read_table
 from magfem.geometry.catalogue import is_path, names
@@ -42,7 +42,7 @@ class Subject:
 
     @property
     def truth(self) -> Field | None:
-        """What to hold the model against: of a coil the model's circuit, and scaled as the model was by measurements."""
+        """What to hold the model against: of a coil the model's circuit; scaled as measurements scaled the model."""
         field: Field | None = self.solution
         circuit = self.model.provenance.get("circuit")
         if isinstance(self.solution, CoilSolution) and circuit is not None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
+from scipy.ndimage import binary_dilation
 
 from magfem.fields import Shell
 from magfem.fields.region import SampledRegion
@@ -89,8 +90,19 @@ def _level(region: SampledRegion, low: Floats, high: Floats, middle: Floats) -> 
     return float(heights[inside.argmax()]) if inside.any() else float(middle[2])
 
 
-def draw_region(axes: Axes, region: SampledRegion, cut: Cut, filled: bool = False) -> None:
-    """The region's outline, the device's hull in grey; hatched, or if `filled` the region in blue."""
+def tiles(region: SampledRegion, points: Points) -> Booleans:
+    """The tiles (v, h) of a map that show a region: those with their middle (v, h, 3) in it, and their neighbours."""
+    shown: Booleans = binary_dilation(region.contains(points), np.ones((3, 3)))
+    if isinstance(region, Shell):
+        shown &= region.hull.distance(points) > 0.3 * region.clearance
+    return shown
+
+
+def draw_region(axes: Axes, region: SampledRegion, cut: Cut, filled: bool = False) -> bool:
+    """The region's outline, the device's hull in grey; hatched outside it, or if `filled` the region in blue.
+
+    Returns whether the plane cuts the hull.
+    """
     horizontal, vertical, points = cut.points(_FINE)
     inside = region.contains(points)
     place = horizontal * MILLI, vertical * MILLI
@@ -98,12 +110,15 @@ def draw_region(axes: Axes, region: SampledRegion, cut: Cut, filled: bool = Fals
         axes.contourf(*place, inside, levels=[0.5, 1.5], colors=["#d6e8f5"])
     elif not inside.all():
         axes.contourf(*place, inside, levels=[-0.5, 0.5], colors=["white"], hatches=["////"])
+    cut_hull = False
     if isinstance(region, Shell):
         device = region.hull.distance(points) <= 1e-9
-        if device.any():
+        cut_hull = bool(device.any())
+        if cut_hull:
             axes.contourf(*place, device, levels=[0.5, 1.5], colors=["#c3c9cf"])
     if _both(inside):
         axes.contour(*place, inside, levels=[0.5], colors=[BLUE if filled else GREY], linewidths=1)
+    return cut_hull
 
 
 def frame_cut(axes: Axes, cut: Cut) -> None:

@@ -56,10 +56,10 @@ def region_cut_figure(region: SampledRegion, cut: Cut) -> Picture:
     with drawing():
         drawn = figure(float(np.clip(0.7 + 3.6 * ratio, 1.8, 4.4)))
         axes = drawn.add_subplot()
-        draw_region(axes, region, cut, filled=True)
+        hull = draw_region(axes, region, cut, filled=True)
         frame_cut(axes, cut)
         content = png(drawn)
-    device = " Grey: the device's hull." if isinstance(region, Shell) else ""
+    device = " Grey: the device's hull." if hull else ""
     return Picture(
         f"region_{cut.horizontal}{cut.vertical}",
         content,

@@ -14,7 +14,7 @@ from magfem.fields import Field, Shell
 from magfem.fields.region import SampledRegion
 from magfem.fitting import FieldModel, Validation
 from magfem.fitting.located_errors import bounds, distance_in, largest_sizes, middle, sizes
-from magfem.report.figures.cuts import MILLI, Cut, draw_region, frame_cut
+from magfem.report.figures.cuts import MILLI, Cut, draw_region, frame_cut, tiles
 from magfem.report.figures.style import (
     BLUE,
     DPI,
@@ -57,12 +57,12 @@ def map_axes(cut: Cut) -> tuple[Figure, Axes, Axes]:
 def region_field_map(model: FieldModel, cut: Cut) -> Picture:
     """|B| in colours and field lines, within the model's region."""
     horizontal, vertical, points = cut.points(_TILES)
-    inside = model.region.contains(points)
+    inside = tiles(model.region, points)
     size = np.full(inside.shape, np.nan)
     size[inside] = np.linalg.norm(model.B(points[inside], outside="extrapolate"), axis=-1) * MILLI
     low, high = (float(q) for q in np.quantile(size[inside], (0.002, 0.9995)))
     across, up, seeds = cut.points(_LINES)
-    flow = np.full(seeds.shape[:2] + (2,), np.nan)
+    flow = np.full((*seeds.shape[:2], 2), np.nan)
     known = model.region.contains(seeds)
     flow[known] = model.B(seeds[known], outside="extrapolate")[:, list(cut.columns)]
     flow /= np.maximum(np.linalg.norm(flow, axis=-1, keepdims=True), 1e-300)
@@ -82,7 +82,7 @@ def region_field_map(model: FieldModel, cut: Cut) -> Picture:
             arrowsize=0.7,
             density=1.0,
         )
-        draw_region(axes, model.region, cut)
+        hull = draw_region(axes, model.region, cut)
         frame_cut(axes, cut)
         bar = drawn.colorbar(image, cax=beside)
         axes.set_title(f"|B| (m{model.unit})", loc="left")
@@ -94,14 +94,14 @@ def region_field_map(model: FieldModel, cut: Cut) -> Picture:
         content,
         f"Map of the flux density in the {cut.words}, from {low:.3g} to {high:.3g} m{model.unit}, with field lines.",
         f"|B| and field lines in the {cut.words}, where the model holds"
-        + ("; grey is the device's hull." if isinstance(model.region, Shell) else "."),
+        + ("; grey is the device's hull." if hull else "."),
     )
 
 
 def cut_errors(model: FieldModel, truth: Field, cut: Cut, count: int = _TILES) -> dict[str, Floats]:
     """Relative errors (v, h) of B and of the gradient in a plane, NaN outside the region."""
     _, _, points = cut.points(count)
-    inside = model.region.contains(points)
+    inside = tiles(model.region, points)
     theirs = truth.jet(points[inside], 1, outside="extrapolate")
     ours = model.jet(points[inside], 1, outside="extrapolate")
     difference = tuple(a - b for a, b in zip(ours, theirs, strict=True))

@@ -1,4 +1,4 @@
-"""One picture of a model against samples: where the residuals are, how they are spread, and whether noise explains it."""
+"""One picture of a model against samples: where the residuals are, how they spread, whether noise explains them."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ from magfem.report.figures.style import (
     percent_log,
     png,
 )
-from magfem.typing import Floats
+from magfem.typing import Floats, Points
 
-_LINE = 0.05  # second over first extent of the samples, below which they lie on a line
+_LINE = 0.05  # second over first extent of the samples, below which they lie on a line or in a plane
 _ALIKE = 0.05  # distances that differ by less than this share are one
 _PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 
@@ -40,7 +40,7 @@ def residual_figure(model: FieldModel, residuals: SampleResiduals, found: Valida
     with drawing():
         drawn = figure(8.0, 9.4)
         panels = drawn.subplot_mosaic([["first", "second"], ["histogram", "errors"]])
-        if extent[order[1]] < _LINE * extent[order[0]]:
+        if _on_a_line(residuals.points):
             for name in ("first", "second"):
                 panels[name].remove()
             axes = drawn.add_subplot(2, 1, 1)
@@ -68,6 +68,12 @@ def _heading(drawn: Figure, model: FieldModel, found: Validation) -> None:
     verdict = "the stated bound is kept" if found.passed else "the stated bound is EXCEEDED"
     text = f"{model.name}\nagainst {found.reference}: {verdict}"
     drawn.suptitle(text, x=0.01, ha="left", fontsize=10.5, fontweight="bold")
+
+
+def _on_a_line(points: Points) -> bool:
+    """Whether points (n, 3) leave a straight line by no more than a small share of its length."""
+    lengths = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    return bool(lengths[1:2].sum() <= _LINE * lengths[0])
 
 
 def _planes(extent: Floats) -> tuple[tuple[int, int], tuple[int, int]]:
