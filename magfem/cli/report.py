@@ -25,7 +25,6 @@ def add(commands: CommandLine) -> None:
         [
             "magfem report ring_magnet_4x1.5x1",
             "magfem report ring.json -o ring.html",
-            "magfem report planar_coil_12mm",
             "magfem report ./my_recipe.toml -o mine.html --pdf",
             "magfem report field.json --samples samples.csv",
         ],
