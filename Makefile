@@ -17,6 +17,7 @@ report: build/$(REPORT).html ## solve and fit a ring magnet, write build/ring_ma
 
 test: .venv/ready ## everything: ruff, mypy, pytest with the browser's and Octave's tests
 	@sh tools/system_packages.sh browser
+	@sh tools/mag_manip.sh .venv/bin/python
 	@sh tools/system_packages.sh octave
 	@$(MAKE) --no-print-directory lint
 	.venv/bin/pytest
