@@ -43,7 +43,7 @@ _TICKS = tuple(d * 10.0**p for p in range(-3, 4) for d in (1, 2, 5))
 def map_axes(cut: Cut) -> tuple[Figure, Axes, Axes]:
     """A figure with a map of a cut's own shape and its colour bar."""
     ratio = (cut.high[1] - cut.low[1]) / (cut.high[0] - cut.low[0])
-    left, bottom, top, bar = 0.56, 0.46, 0.34, 0.94  # inches
+    left, bottom, top, bar = 0.68, 0.46, 0.34, 0.94  # inches
     width = WIDTH - left - bar
     height = min(width * ratio, 4.2)
     width = height / ratio

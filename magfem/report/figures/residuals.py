@@ -39,20 +39,18 @@ def residual_figure(model: FieldModel, residuals: SampleResiduals, found: Valida
     order = np.argsort(-extent, kind="stable")
     with drawing():
         drawn = figure(8.0, 9.4)
-        panels = drawn.subplot_mosaic([["first", "second"], ["histogram", "errors"]])
-        if _on_a_line(residuals.points):
-            for name in ("first", "second"):
-                panels[name].remove()
-            axes = drawn.add_subplot(2, 1, 1)
-            _along(axes, residuals, int(order[0]), factor, unit)
+        line = _on_a_line(residuals.points)
+        panels = drawn.subplot_mosaic("aa;he" if line else "ab;he")
+        if line:
+            _along(panels["a"], residuals, int(order[0]), factor, unit)
         else:
             first, second = _planes(extent)
-            image = _scatter(panels["first"], residuals, first, factor)
-            _scatter(panels["second"], residuals, second, factor)
-            bar = drawn.colorbar(image, ax=[panels["first"], panels["second"]], pad=0.015, aspect=24)
+            image = _scatter(panels["a"], residuals, first, factor)
+            _scatter(panels["b"], residuals, second, factor)
+            bar = drawn.colorbar(image, ax=[panels["a"], panels["b"]], pad=0.015, aspect=24)
             bar.set_label(f"|ΔB| ({unit})")
-        _histogram(panels["histogram"], residuals, factor, unit)
-        _relative(panels["errors"], residuals, found)
+        _histogram(panels["h"], residuals, factor, unit)
+        _relative(panels["e"], residuals, found)
         _heading(drawn, model, found)
         content = png(drawn)
     return Picture(
@@ -166,7 +164,7 @@ def _relative(axes: Axes, residuals: SampleResiduals, found: Validation) -> None
     axes.minorticks_off()
     axes.set_xlabel(label)
     axes.set_title("relative error of B", loc="left")
-    axes.legend(loc="best")
+    axes.legend(loc="lower right")
     grid(axes)
 
 

@@ -18,7 +18,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator
 
 WIDTH = 4.6  # inches; about a phone's width, so that the lettering stays legible there
 DPI = 200
-_SHORT = 30.0  # ratio of a logarithmic axis' ends up to which whole decades are too few labels
+_SHORT = 80.0  # ratio of a logarithmic axis' ends up to which whole decades are too few labels
 
 # Okabe and Ito's palette: told apart by colour-blind readers, and in grey by lightness.
 BLUE, ORANGE, GREEN, PURPLE = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
