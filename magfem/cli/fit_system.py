@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from magfem.actuation import Calibration
     from magfem.samples import SystemSamples
 
-_DEVICES = ("device", "circuit", "family", "dimension", "resolution")
+_DEVICES = ("device", "circuit", "family", "dimension", "resolution", "free")
 
 
 def fit_system(samples: SystemSamples, options: Namespace) -> int:
