@@ -32,8 +32,7 @@ def add(commands: CommandLine) -> None:
         [
             "magfem fit ring_magnet_4x1.5x1",
             "magfem fit ./my_recipe.toml -o mine.json",
-            "magfem fit samples.csv -o field.json --sigma '0.1 mT'",
-            "magfem fit system.csv -o system.json",
+            "magfem fit system.csv -o system.json --sigma '50 uT'",
             "magfem fit scan.csv --device disc_magnet_8x2 --column x=-magnet_x_mm --column 'y==0 mm' -o scan.json",
         ],
     )
