@@ -151,11 +151,11 @@ def _vtu(field: Field, path: Path, options: Namespace) -> dict[str, Any]:
 
 def _samples(field: Field, path: Path, options: Namespace) -> dict[str, Any]:
     from magfem.cli.points import field_text
-    from magfem.exchange.vtk_grid import region_points
+    from magfem.exchange.region_parts import region_points
     from magfem.files import write_text
 
     given = _points(options)
-    points = region_points(field) if given is None else given
+    points = region_points(field.region) if given is None else given
     write_text(path, field_text(points, *field.jet(points, 1 if options.gradient else 0)))
     return {"points": len(points), "gradient": options.gradient}
 
