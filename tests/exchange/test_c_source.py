@@ -16,6 +16,7 @@ import magfem
 from magfem.errors import InputError
 from magfem.exchange import c_header
 from magfem.exchange.c_source import as_c_name, c_name
+from magfem.exchange.region_parts import region_points
 from magfem.fields import Evaluated, Everywhere, Field, Shell
 from magfem.fields.hull import BoxHull, PolytopeHull, SphereHull
 from magfem.fields.region import Region
@@ -161,6 +162,17 @@ def test_inside_ends_where_the_region_ends(compiler: str, tmp_path: Path, name: 
     assert count > 100 and np.abs(within - beyond).max() < 1e-12
     program = compiled(compiler, tmp_path, c_header(REGIONS[name], "some"))
     assert np.all(run(program, within)[0] == 1) and np.all(run(program, beyond)[0] == 0)
+
+
+def test_a_coil_of_the_catalogue_per_ampere(compiler: str, tmp_path: Path) -> None:
+    """BigMag's coil: T/A, in a window far in front of it."""
+    coil = magfem.load_model("bigmag_iron")
+    points = region_points(coil.region, 500)
+    header = c_header(coil, "some")
+    inside, found, slopes = run(compiled(compiler, tmp_path, header), points)
+    assert np.all(inside == 1) and "T of a disc, for 1 A" in header and "the field of 1 A" in header
+    assert worst(found, coil.B(points)) < 1e-12 and worst(slopes, coil.gradient(points)) < 1e-12
+    assert np.all(run(tmp_path / "program", points * [1, 1, -1])[0] == 0)  # behind it
 
 
 def test_region_that_c_is_not_told_of(compiler: str, tmp_path: Path) -> None:
