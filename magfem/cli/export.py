@@ -80,8 +80,8 @@ def add(commands: CommandLine) -> None:
         help="vti, mpem: where, six lengths with their units, lowest and highest x, y and z (default: around the "
         "region; mpem: all of it)",
     )
+    parser.add_argument("--tolerance", metavar="REL", type=float, help="mpem: largest relative error (default: 0.01)")
     parser.add_argument("--points", metavar="P.csv", help="vtu, samples: where (default: 2560 points of the region)")
-    parser.add_argument("--tolerance", metavar="REL", type=float, help="mpem: of B, if a fit is needed (default: 0.01)")
     parser.add_argument("--gradient", action="store_true", help="samples: with the nine components of the gradient")
 
 
@@ -208,9 +208,9 @@ def _mpem(source: Field | CoilSystem, path: Path, options: Namespace) -> dict[st
     workspace = None if options.bounds is None else Box(*_bounds(options.bounds))
     done = write_mpem(source, path, workspace, tolerance)
     count = f"{done.sources} source{'s' * (done.sources != 1)}"
-    residual = "exact" if done.exact else f"residual of B at most {done.maximum:.2g}, {done.rms:.2g} RMS, relative"
+    residual = f"fitted, relative error of B at most {done.maximum:.1e}, {done.rms:.1e} RMS"
     return {
-        "remark": f"{count}, {residual}",
+        "remark": f"{count}, {'exact' if done.exact else residual}",
         "sources": done.sources,
         "exact": done.exact,
         "residual": {"max": done.maximum, "rms": done.rms},

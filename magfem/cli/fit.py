@@ -29,7 +29,6 @@ def add(commands: CommandLine) -> None:
         "do (turned sensors, background, robust loss) is for recipes.",
         [
             "magfem fit ring_magnet_4x1.5x1",
-            "magfem fit ring_magnet_4x1.5x1 -o ring.json --resolution 2",
             "magfem fit ./my_recipe.toml -o mine.json",
             "magfem fit samples.csv -o field.json --sigma '0.1 mT'",
             "magfem fit scan.csv --device disc_magnet_8x2 --column x=-magnet_x_mm --column 'y==0 mm' -o scan.json",

@@ -15,32 +15,30 @@ from magfem.fitting.objective import Objective, rows
 from magfem.fitting.sampling import LayeredData
 from magfem.typing import Floats
 
-_EVALUATIONS = 60  # of the residual's Jacobian from one start
-_MOST_POINTS = 350  # places are found on a part of the data: the coefficients then take all of it
+_EVALUATIONS = 40  # of the residual's Jacobian
+_MOST_POINTS = 150  # places are found on a part of the data: the coefficients then take all of it
 
 
 def place(displaceable: Displaceable, data: LayeredData, objective: Objective) -> Candidate:
-    """The candidate with the places that fit best, from all starts."""
+    """The candidate with the places that fit best, sought from the most promising start."""
     few = _thinned(data)
 
     def residual(places: Floats) -> Floats:
         matrix, target = rows(displaceable.make(places), few, objective)
         return solve_least_squares(matrix, target).residual
 
-    found = [
-        least_squares(
-            residual,
-            np.clip(start, displaceable.lower, displaceable.upper),
-            bounds=(displaceable.lower, displaceable.upper),
-            x_scale=displaceable.upper - displaceable.lower,
-            max_nfev=_EVALUATIONS,
-            xtol=1e-6,
-            ftol=1e-6,
-        )
-        for start in displaceable.start
-    ]
-    best = min(found, key=lambda one: float(one.cost))
-    return displaceable.make(best.x)
+    starts = np.clip(displaceable.start, displaceable.lower, displaceable.upper)
+    best = min(starts, key=lambda start: float(np.sum(residual(start) ** 2)))
+    found = least_squares(
+        residual,
+        best,
+        bounds=(displaceable.lower, displaceable.upper),
+        x_scale=displaceable.upper - displaceable.lower,
+        max_nfev=_EVALUATIONS,
+        xtol=1e-3,
+        ftol=1e-3,
+    )
+    return displaceable.make(found.x)
 
 
 def _thinned(data: LayeredData) -> LayeredData:
