@@ -233,9 +233,9 @@ def single() -> None:
     fixed = bigmag.at(currents)
     cylinder, dipole = disc_magnet(), magpylib.misc.Dipole(moment=(0, 0, 1e-2))
     calls = {
-        "ring, 20 loops: `model.jet(point)`": lambda: ring.jet(near),
+        f"ring, {ring.lowered.kind.size} loops: `model.jet(point)`": lambda: ring.jet(near),
         "ring: `model.B(point)`": lambda: ring.B(near),
-        "rotor, 5 harmonics: `model.jet(point)`": lambda: rotor.jet(far),
+        f"rotor, {rotor.lowered.degree.size} harmonics: `model.jet(point)`": lambda: rotor.jet(far),
         "rotor: `model.B(point)`": lambda: rotor.B(far),
         "BigMag, 6 coils: `system.B(point, currents)`": lambda: bigmag.B(origin, currents),
         "BigMag at fixed currents: `field.jet(point)`": lambda: fixed.jet(origin),

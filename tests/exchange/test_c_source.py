@@ -164,9 +164,10 @@ def test_inside_ends_where_the_region_ends(compiler: str, tmp_path: Path, name: 
     assert np.all(run(program, within)[0] == 1) and np.all(run(program, beyond)[0] == 0)
 
 
-def test_a_coil_of_the_catalogue_per_ampere(compiler: str, tmp_path: Path) -> None:
-    """BigMag's coil: T/A, in a window far in front of it."""
-    coil = magfem.load_model("bigmag_iron")
+@pytest.mark.parametrize("name", ["bigmag_iron", "solenoid_24x48x60_front"])
+def test_coils_of_the_catalogue_per_ampere(compiler: str, tmp_path: Path, name: str) -> None:
+    """In T/A, one in a ball and one in a window, both in front of the coil."""
+    coil = magfem.load_model(name)
     points = region_points(coil.region, 500)
     header = c_header(coil, "some")
     inside, found, slopes = run(compiled(compiler, tmp_path, header), points)

@@ -26,7 +26,7 @@ from magfem.fields.terms_json import terms_to_list
 from magfem.fields.workspace_region import Box
 from magfem.typing import Floats
 
-RING, ROTOR = "ring_magnet_4x1.5x1", "rotor_1x3"
+RING, ROTOR, SOLENOID = "ring_magnet_4x1.5x1", "rotor_1x3", "solenoid_24x48x60_front"
 
 
 @pytest.fixture
@@ -183,15 +183,24 @@ def test_calibration_of_a_whole_system(here: Path, capsys: pytest.CaptureFixture
 
 
 def test_other_programs_take_windows_of_coils(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """BigMag's coil is per ampere and has a window: its grid fills that, its samples lie in it, in T at a current."""
-    coil = magfem.load_model("bigmag_iron")
-    data = output(capsys, "bigmag_iron", "--to", "vti", "-o", "coil.vti", "--grid", "9")
+    """The solenoid's model is per ampere and in a window: its grid fills that, its samples lie in it, in T at 2 A."""
+    coil = magfem.load_model(SOLENOID)
+    data = output(capsys, SOLENOID, "--to", "vti", "-o", "coil.vti", "--grid", "9")
     assert isinstance(coil.region, Shell) and coil.region.windowed
     assert np.allclose(data["bounds"], bounding_box(coil.region)) and data["unit"] == "T/A"
-    output(capsys, "bigmag_iron", "--to", "samples", "-o", "coil.csv", "--current", "2")
+    output(capsys, SOLENOID, "--to", "samples", "-o", "coil.csv", "--current", "2")
     table = np.loadtxt("coil.csv", delimiter=",", skiprows=1)
     assert coil.region.contains(table[:, :3]).all()
     assert np.allclose(table[:, 3:], 2 * coil.B(table[:, :3]), rtol=1e-14, atol=0)
+
+
+def test_calibration_of_a_coil_in_its_window(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Loops become multipoles all over the window, and the stated error is the file's, by the formula."""
+    data = output(capsys, SOLENOID, "--to", "mpem", "-o", "coil.yaml")
+    coil = magfem.load_model(SOLENOID)
+    points = region_points(coil.region)
+    error = worst_of(file_field(points, content("coil.yaml"), [1.0]), coil.B(points))
+    assert error < data["residual"]["max"] < 0.01 and list(data["coils"]) == ["Coil_0"] and not data["exact"]
 
 
 def test_mistakes_are_one_line_and_leave_nothing(coil: Field, capsys: pytest.CaptureFixture[str]) -> None:
