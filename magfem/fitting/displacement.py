@@ -15,12 +15,13 @@ from magfem.fitting.objective import Objective, rows
 from magfem.fitting.sampling import LayeredData
 from magfem.typing import Floats
 
+_REFINED = 2  # of the starts
 _EVALUATIONS = 40  # of the residual's Jacobian
 _MOST_POINTS = 150  # places are found on a part of the data: the coefficients then take all of it
 
 
 def place(displaceable: Displaceable, data: LayeredData, objective: Objective) -> Candidate:
-    """The candidate with the places that fit best, sought from the most promising start."""
+    """The candidate with the places that fit best, sought from the most promising starts."""
     few = _thinned(data)
 
     def residual(places: Floats) -> Floats:
@@ -28,17 +29,20 @@ def place(displaceable: Displaceable, data: LayeredData, objective: Objective) -
         return solve_least_squares(matrix, target).residual
 
     starts = np.clip(displaceable.start, displaceable.lower, displaceable.upper)
-    best = min(starts, key=lambda start: float(np.sum(residual(start) ** 2)))
-    found = least_squares(
-        residual,
-        best,
-        bounds=(displaceable.lower, displaceable.upper),
-        x_scale=displaceable.upper - displaceable.lower,
-        max_nfev=_EVALUATIONS,
-        xtol=1e-3,
-        ftol=1e-3,
-    )
-    return displaceable.make(found.x)
+    promising = sorted(starts, key=lambda start: float(np.sum(residual(start) ** 2)))[:_REFINED]
+    found = [
+        least_squares(
+            residual,
+            start,
+            bounds=(displaceable.lower, displaceable.upper),
+            x_scale=displaceable.upper - displaceable.lower,
+            max_nfev=_EVALUATIONS,
+            xtol=1e-4,
+            ftol=1e-4,
+        )
+        for start in promising
+    ]
+    return displaceable.make(min(found, key=lambda one: float(one.cost)).x)
 
 
 def _thinned(data: LayeredData) -> LayeredData:
