@@ -53,7 +53,8 @@ class Source:
     """Sources in the size of the ring (of the rotor, where they are transverse), and magpylib's.
 
     wanted: points per second, 10⁶, that are the target.  fewer: at how many points ours is timed.  same: whether
-    magpylib's is the same object, which is then checked, or only of the same kind.
+    magpylib's is the same object, which is then checked, or only of the same kind.  across: whether the points are
+    the rotor's rather than the ring's.
     """
 
     name: str
@@ -63,6 +64,7 @@ class Source:
     wanted: float | None = None
     fewer: int = MILLION
     same: bool = False
+    across: bool = False
 
 
 def six_poles() -> Source:
@@ -95,12 +97,12 @@ def disc_magnet() -> Any:
 
 
 def transverse(parts: tuple[bool, ...]) -> Source:
-    """|m| = 1, degrees 1 to 9: cosines, or sines as well."""
+    """Order 1 (|m| = 1), degrees 1 to 9: cosines, or sines as well."""
     degree, sine = [n for part in parts for n in range(1, 10)], [part for part in parts for _ in range(9)]
     values = np.random.default_rng(2).normal(size=len(degree)) * 0.1
     which = "cosines" if len(parts) == 1 else "cosines and sines"
     terms = harmonics(1.58e-3, degree, [1] * len(degree), sine, values)
-    return Source(f"|m| = 1 to degree 9, {which}", terms, "Cylinder, across its axis", rotor_magnet, 5)
+    return Source(f"order 1 to degree 9, {which}", terms, "Cylinder, across its axis", rotor_magnet, 5, across=True)
 
 
 def oblate_discs() -> Source:
@@ -138,12 +140,12 @@ def interior() -> Source:
 
 def sources() -> None:
     """Kinds of sources as `Terms.jet` evaluates them, beside magpylib."""
-    points = {False: points_of(), True: points_of("rotor_1x3")}
+    points = points_of(), points_of("rotor_1x3")
     listed = [six_poles(), twenty_loops(), transverse((False,)), transverse((False, True))]
     listed += [oblate_discs(), path(), two_charge_discs(), interior()]
     rows = []
     for source in listed:
-        own = points["|m|" in source.name]
+        own = points[source.across]
         few, fewest = own[:: MILLION // source.fewer], own[:: MILLION // min(FEWER, source.fewer)]
         runs: list[Callable[[], object]] = [partial(source.terms.jet, few, order) for order in (0, 1)]
         counts = [len(few)] * 2
