@@ -18,7 +18,7 @@ from magfem.fields.packed import (
     TRANSVERSE_SIN,
     ZONAL,
 )
-from magfem.fields.packing import BLOCK, add_rotated, unpack
+from magfem.fields.packing import BLOCK, WORK_ROWS, add_rotated, unpack
 from magfem.fields.solid_harmonics import add_harmonics
 from magfem.fields.transverse_harmonics import add_transverse
 from magfem.fields.zonal_harmonics import add_oblate, add_zonal
@@ -48,6 +48,7 @@ def evaluate(
     z = np.empty(BLOCK)
     total = np.empty((15, BLOCK))
     turned = np.empty((15, BLOCK))
+    work = np.empty((WORK_ROWS, BLOCK))
     entries = 3 if order == 0 else 8 if order == 1 else 15
     for begin in range(0, points.shape[0], BLOCK):
         count = min(BLOCK, points.shape[0] - begin)
@@ -72,17 +73,17 @@ def evaluate(
                     turned[:entries, :count] = 0.0
                     fresh = False
             if how == LOOPS:
-                add_loops(x, y, z, count, radius, value, order, out)
+                add_loops(x, y, z, count, radius, value, order, work, out)
             elif how == ZONAL:
-                add_zonal(x, y, z, count, radius, reals[first:last], order, out)
+                add_zonal(x, y, z, count, radius, reals[first:last], order, work, out)
             elif how in (TRANSVERSE_COS, TRANSVERSE_SIN):
-                add_transverse(x, y, z, count, radius, reals[first:last], how == TRANSVERSE_SIN, order, out)
+                add_transverse(x, y, z, count, radius, reals[first:last], how == TRANSVERSE_SIN, order, work, out)
             elif how == OBLATE_DISC:
                 add_oblate(x, y, z, count, radius, complexes[first:last], order, out)
             elif how == CONDUCTOR:
-                add_closed_path(x, y, z, count, nodes[first:last], value, order, out)
+                add_closed_path(x, y, z, count, nodes[first:last], value, order, work, out)
             elif how == DISC:
-                add_charge_discs(x, y, z, count, radius, value, order, out)
+                add_charge_discs(x, y, z, count, radius, value, order, work, out)
             else:
                 add_harmonics(
                     x,
