@@ -3,7 +3,7 @@
 
 PYTHON ?= python3
 REPORT := ring_magnet_4x1.5x1
-FITS := ring_magnet_4x1.5x1 rotor_1x3
+FITS = $(basename $(notdir $(wildcard fits/*.toml)))
 SOURCES = $(shell find magfem geometries fits reports -type f -not -path '*/__pycache__/*' 2>/dev/null)
 
 .DEFAULT_GOAL := help
@@ -17,6 +17,7 @@ report: build/$(REPORT).html ## solve and fit a ring magnet, write build/ring_ma
 
 test: .venv/ready ## everything: ruff, mypy, pytest with the browser's and Octave's tests
 	@sh tools/system_packages.sh browser
+	@sh tools/mag_manip.sh .venv/bin/python
 	@sh tools/system_packages.sh octave
 	@$(MAKE) --no-print-directory lint
 	.venv/bin/pytest
@@ -28,7 +29,7 @@ lint: .venv/ready ## ruff check, ruff format --check, mypy
 
 fits: .venv/ready ## remake the committed field models in fits/
 	@mkdir -p fits
-	for card in $(FITS); do .venv/bin/magfem fit "$$card" -o "fits/$$card.json" || exit; done
+	for recipe in $(FITS); do .venv/bin/magfem fit "$$recipe" -o "fits/$$recipe.json" || exit; done
 
 lock: ## remake requirements.lock, keeping its pins where they still fit (UPGRADE=1: the newest of everything)
 	@sh tools/lock.sh "$(PYTHON)" $(if $(UPGRADE),--upgrade)

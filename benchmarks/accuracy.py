@@ -6,13 +6,13 @@ from tests/references, or closed forms where the recoil permeability is 1.
 
 from __future__ import annotations
 
-import json
 import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from published_ring_fits import published_ring_fits
 from tables import show
 
 import magfem
@@ -20,7 +20,7 @@ from magfem.closed_form import ExactField
 from magfem.fem.solve_magnets import solve_once
 from magfem.fields.field import Field
 from magfem.fields.norms import relative_errors
-from magfem.fields.terms import Terms, concatenate, frame_about, harmonics
+from magfem.fields.terms import Terms, frame_about, harmonics
 from magfem.fields.terms_json import terms_from_list
 from magfem.fitting.least_squares import solve_least_squares
 from magfem.geometry import Geometry
@@ -117,16 +117,15 @@ def published() -> None:
     """The dissertation's own ring fits, as published, in the windows that their file names state."""
     ring = device("ring_magnet_4x1.5x1", 1.0)
     exact, model = magfem.exact(ring), magfem.fit(magfem.solve(ring))
-    content = json.loads((HERE / "published_ring_magnet_fits.json").read_text())
     rng = np.random.default_rng(7)
     rows = []
-    for name, fit in content["fits"].items():
-        z, rho = (rng.uniform(*fit["window"][axis], 5000) for axis in ("z", "rho"))
+    for name, (theirs, window) in published_ring_fits().items():
+        z, rho = (rng.uniform(*window[axis], 5000) for axis in ("z", "rho"))
         azimuth = rng.uniform(0, 2 * np.pi, 5000)
         points = np.column_stack([rho * np.cos(azimuth), rho * np.sin(azimuth), z])
         truth = exact.jet(points, 1)
         for label, jet in (
-            (f"published, “{name}”", _published(fit["sources"]).jet(points, 1)),
+            (f"published, “{name}”", theirs.jet(points, 1)),
             (
                 f"magfem in that window, {model.report['parameters']} numbers",
                 model.jet(points, 1, outside="extrapolate"),
@@ -139,19 +138,6 @@ def published() -> None:
             rows.append(row)
     header = ["fit", "B max", "B RMS", "gradient max", "gradient RMS"]
     show("Published ring fits against the closed form", header, rows)
-
-
-def _published(sources: list[dict[str, Any]]) -> Terms:
-    """a_k ∂ᵏ/∂zᵏ (1/r) is the harmonic of degree k with g = (−1)^(k+1) k! a_k / a^(k+2)."""
-    radius, parts = 2e-3, []
-    for source in sources:
-        a = np.array(source["a"])
-        k = np.arange(1, a.size + 1)
-        g = -np.cumprod(-k) * a / radius ** (k + 2.0)
-        zeros = [0] * a.size
-        centre = np.array([0.0, 0.0, source["z_source_m"]])
-        parts.append(harmonics(radius, k.tolist(), zeros, [False] * a.size, g, centre=centre))
-    return concatenate(parts)
 
 
 def symmetry() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import tempfile
 from collections.abc import Callable, Iterator
@@ -41,8 +42,13 @@ def write_json(path: Path, data: Any) -> None:
 
 
 def to_json(data: Any) -> str:
-    """JSON text of plain data and NumPy arrays."""
-    return json.dumps(data, indent=1, allow_nan=False, ensure_ascii=False, default=_plain)
+    """JSON text of plain data and NumPy arrays; lists of numbers stand on one line."""
+    text = json.dumps(data, indent=1, allow_nan=False, ensure_ascii=False, default=_plain)
+    return _NUMBERS.sub(lambda found: f"[{_BREAK.sub(' ', found[1])}]", text)
+
+
+_NUMBERS = re.compile(r"\[\n\s*([-+0-9.eE]+(?:,\n\s*[-+0-9.eE]+)*)\n\s*\]")  # texts hold no line breaks as such
+_BREAK = re.compile(r"\n\s*")
 
 
 def read_json(path: Path, what: str) -> Any:

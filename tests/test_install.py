@@ -118,6 +118,9 @@ def test_the_catalogue_travels(programs: Path, tmp_path: Path) -> None:
         assert f'"{model.stem}"' in listed, f"magfem list does not know {model.stem}"
         load = f"import magfem; print(magfem.load_model({model.stem!r}).moment)"
         run(programs / "python", "-c", load, cwd=tmp_path)
+    for system in (CHECKOUT / "geometries" / "systems").glob("*.toml"):
+        load = f"import magfem; print(magfem.load_system({system.stem!r}))"
+        run(programs / "python", "-c", load, cwd=tmp_path)
 
 
 def test_exports_travel(programs: Path, tmp_path: Path) -> None:

@@ -73,7 +73,7 @@ def _source(node: _Node, centre: Floats) -> Terms:
     if not direction.any():
         raise node.error("Source_Direction must not be zero", "Source_Direction")
     radius = reference_radius(float(np.linalg.norm(position - centre)))
-    frame = frame_about(direction)
+    frame = frame_about(direction / np.abs(direction).max())  # whose square neither overflows nor vanishes
     parts = []
     for key, kind in (("A_Coeff", INTERIOR), ("B_Coeff", HARMONIC)):
         given = np.array(node.get(key).numbers()) if key in node else np.empty(0)

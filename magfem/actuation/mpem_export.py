@@ -37,7 +37,8 @@ class MpemExport:
     """What was written.
 
     exact: whether every term went over as it is, up to rounding.  maximum, rms: relative errors of B (norm of
-    `fields.norms`) over points of the region that were not fitted, the worst coil's; zero when exact.
+    `fields.norms`) at points of the region that were not fitted, the worst coil's, the maximum with a margin as in
+    `harmonic_fit`; zero when exact.
     residuals: (maximum, rms) by coil.  sources: how many the file has.  region: where the residual was measured.
     """
 
@@ -74,11 +75,11 @@ def write_mpem(
     worst = max(fits, key=lambda label: fits[label].maximum)
     maximum, rms = fits[worst].maximum, fits[worst].rms
     exact = maximum == 0
-    outcome = "exact" if exact else f"residual of B at most {maximum:.2%}, {rms:.2%} RMS"
+    outcome = "exact" if exact else f"fitted, relative error of B at most {maximum:.1e}, {rms:.1e} RMS"
     if maximum > tolerance and strict:
         raise ConvergenceError(
             f"axial multipoles describe {worst} of {name} to {maximum:.2g} of B at best, more than the tolerance of "
-            f"{tolerance:.2g}: choose a smaller workspace, a larger tolerance, or strict=False to write it all the same"
+            f"{tolerance:.2g}: choose a smaller workspace or a larger tolerance"
         )
     file = Path(path)
     header = [f"{name}, written by magfem.", f"Per ampere, in T/A; {outcome}; region: {region.describe()}."]

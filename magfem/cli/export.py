@@ -43,6 +43,7 @@ def add(commands: CommandLine) -> None:
         "  magpylib   .py   a module whose `source` is a CustomSource\n"
         "  mat        .mat  for MATLAB and Octave, with magfem_field.m beside it, which evaluates it\n"
         "  c          .h    one header, C99 or C++, with the numbers and what evaluates them\n"
+        "  mpem       .yaml axial multipoles, as mag_manip reads them; what is none is fitted, with its residual\n"
         "  vti        .vti  a regular grid for ParaView\n"
         "  vtu        .vtu  points for ParaView\n"
         "  samples    .csv  x,y,z,Bx,By,Bz\n"
@@ -64,8 +65,9 @@ def add(commands: CommandLine) -> None:
     parser.add_argument(
         "--bounds",
         metavar="X,X,Y,Y,Z,Z",
-        help="vti: where, six lengths with their units, lowest and highest x, y and z (default: around the region)",
+        help="vti, mpem: where, six lengths with their units, lowest and highest x, y and z (default: the region)",
     )
+    parser.add_argument("--tolerance", metavar="REL", type=float, help="mpem: largest relative error (default: 0.01)")
     parser.add_argument("--points", metavar="P.csv", help="vtu, samples: where (default: 2560 points of the region)")
     parser.add_argument("--gradient", action="store_true", help="samples: with the nine components of the gradient")
 
@@ -134,6 +136,19 @@ def _c(field: Field, path: Path, options: Namespace) -> dict[str, Any]:
     return {"function": f"{name}_field"}
 
 
+def _mpem(field: Field, path: Path, options: Namespace) -> dict[str, Any]:
+    from magfem.actuation.mpem_export import TOLERANCE, write_mpem
+    from magfem.fields.workspace_region import Box
+
+    workspace = None
+    if options.bounds is not None:
+        low, high = _bounds(options.bounds)
+        workspace = Box((low[0], low[1], low[2]), (high[0], high[1], high[2]))
+    tolerance = TOLERANCE if options.tolerance is None else options.tolerance
+    done = write_mpem(field, path, workspace, tolerance)
+    return {"exact": done.exact, "residual": {"max": done.maximum, "rms": done.rms}, "sources": done.sources}
+
+
 def _vti(field: Field, path: Path, options: Namespace) -> dict[str, Any]:
     from magfem.exchange import write_grid
     from magfem.exchange.vtk_grid import LONGEST
@@ -179,6 +194,7 @@ TARGETS: dict[str, Target] = {
     "magpylib": Target(_magpylib, ".py"),
     "mat": Target(_mat, ".mat"),
     "c": Target(_c, ".h", frozenset({"name"})),
+    "mpem": Target(_mpem, ".yaml", frozenset({"bounds", "tolerance"})),
     "vti": Target(_vti, ".vti", frozenset({"grid", "bounds"})),
     "vtu": Target(_vtu, ".vtu", frozenset({"points"})),
     "samples": Target(_samples, ".csv", frozenset({"points", "gradient"})),

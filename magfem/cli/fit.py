@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from argparse import Namespace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,10 +27,9 @@ def add(commands: CommandLine) -> None:
         "samples. The table holds the model's relative errors at points that the fit has not seen, next to those of\n"
         "the dissertation's families on the same data. A name is a fit recipe if there is one, else a device card.\n"
         "Samples of a coil system (px,py,pz,i0,...,bx,by,bz) make a system file. What else a fit of samples can\n"
-        "do (turned sensors, background, robust loss) is for recipes.",
+        "do (bounds, robust loss, weights) is for recipes.",
         [
             "magfem fit ring_magnet_4x1.5x1",
-            "magfem fit ring_magnet_4x1.5x1 -o ring.json --resolution 2",
             "magfem fit ./my_recipe.toml -o mine.json",
             "magfem fit samples.csv -o field.json --sigma '0.1 mT'",
             "magfem fit scan.csv --device disc_magnet_8x2 --column x=-magnet_x_mm --column 'y==0 mm' -o scan.json",
@@ -45,6 +45,8 @@ def add(commands: CommandLine) -> None:
     samples.add_argument("--device", metavar="CARD", help="whose samples they are")
     samples.add_argument("--column", metavar="NAME=COLUMN", action="append", help="what stands for x, y, z, Bx, ...")
     samples.add_argument("--sigma", metavar="QUANTITY", help="standard deviation of every component, such as '0.1 mT'")
+    samples.add_argument("--free", metavar="NAME", action="append", help="centre, tilt, turn, offsets, gain, ...")
+    samples.add_argument("--background", action="store_true", help="find a static field as well")
 
 
 def run(options: Namespace) -> int:
@@ -72,7 +74,7 @@ def _recipe(options: Namespace) -> Recipe | str | Path:
     target, choices = options.target, {"circuit": options.circuit, "family": options.family}
     if target.lower().endswith((".csv", ".txt")):
         return _samples_recipe(options)
-    for option in ("device", "column", "sigma"):
+    for option in ("device", "column", "sigma", "free", "background"):
         if getattr(options, option):
             raise InputError(f"--{option} is for samples: a file that ends in .csv or .txt, got {quoted(target)}")
     if is_path(target, ".toml"):
@@ -81,10 +83,13 @@ def _recipe(options: Namespace) -> Recipe | str | Path:
         is_recipe = target in names("fits", ".toml")
     if not is_recipe:
         return Recipe(geometry=load_geometry(target), **choices)
-    for option, value in choices.items():
-        if value:
-            raise InputError(f"--{option} is what the recipe {quoted(target)} says itself")
-    return target if not is_path(target, ".toml") else Path(target)
+    recipe = Path(target) if is_path(target, ".toml") else target
+    given = {key: value for key, value in choices.items() if value}
+    if not given:
+        return recipe
+    from magfem.fitting import load_recipe
+
+    return replace(load_recipe(recipe), options={}, **given)
 
 
 def _samples_recipe(options: Namespace) -> Recipe:
@@ -98,6 +103,8 @@ def _samples_recipe(options: Namespace) -> Recipe:
         family=options.family,
         circuit=options.circuit,
         samples=SamplesFile(Path(options.target), parse_columns(options.column or []), sigma),
+        free=dict.fromkeys(options.free or []),
+        background=options.background,
     )
 
 
@@ -119,7 +126,7 @@ def _text(model: FieldModel, path: Path) -> str:
         ("held out", f"{_errors(report['heldout'])} (max), {report['heldout']['points']} points"),
         *(_measured_rows(report) if "measurement" in report else [("FEM's share", _errors(report["fem"]))]),
         ("stated bound", _errors(report["bound"])),
-        ("moment", moment_text(model.moment)),
+        *([("moment", moment_text(model.moment))] if model.moment.any() else []),
         ("model", str(path)),
     ]
     errors = [

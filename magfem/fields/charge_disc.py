@@ -17,12 +17,13 @@ gradient 1e-14, hessian 1e-13; d radii from the rim 1e-17/d, 4e-16/d and 2e-15/d
 
 from __future__ import annotations
 
-from math import pi, sqrt
+from math import inf, pi, sqrt
 
 import numpy as np
 
 from magfem.compiled import kernel
 from magfem.fields.loop import (
+    PRODUCT,
     RING_ROWS,
     T1_32,
     T1_52,
@@ -101,7 +102,7 @@ def add_charge_discs(
     for j in range(count):
         t1_52, t2_72, t1_72, t2_92 = work[T1_52, j], work[T2_72, j], work[T1_72, j], work[T2_92, j]
         profile[0, j] = charge * _axial_field(sqrt(work[S, j]), z[j], radius)
-        profile[1, j] = c * work[T1_32, j]
+        profile[1, j] = c * work[T1_32, j] if work[PRODUCT, j] > 0.0 else inf  # K on the rim is large, but finite
         profile[2, j] = -1.5 * z[j] * c * t1_52
         profile[3, j] = c * (2.5 * a2 * t2_72 - 1.5 * t1_52)
         profile[4, j] = -3.0 * z[j] * c * (35.0 / 6.0 * a2 * t2_92 - 2.5 * t1_72)

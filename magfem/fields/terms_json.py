@@ -108,7 +108,9 @@ def numbers(data: Any) -> Floats:
         array = np.array(data)
     except ValueError:
         array = np.array(None)
-    if array.dtype.kind not in "fiu" or not np.isfinite(array).all():
+    # An array of numbers takes true for 1.
+    truths = any(isinstance(entry, bool) for entry in np.array(data, dtype=object).flat) if array.ndim else False
+    if array.dtype.kind not in "fiu" or truths or not np.isfinite(array).all():
         raise ValueError("finite numbers, in lists of one length")
     return array.astype(float)
 

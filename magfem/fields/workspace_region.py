@@ -41,11 +41,11 @@ class Ball:
         return self.random_points(rng, layers * per_layer)[None]
 
     def random_points(self, rng: np.random.Generator, count: int) -> Points:
-        """Points (count, 3) m, uniform over the volume, a tenth of them on the surface."""
+        """Points (count, 3) m, half uniform over the volume, half over its surface, where errors are largest."""
         direction = rng.normal(size=(count, 3))
         direction /= np.linalg.norm(direction, axis=1, keepdims=True)
         share = np.cbrt(rng.random(count))
-        share[: count // 10] = 1.0
+        share[: count // 2] = 1.0
         points: Points = self.centre + self.radius * share[:, None] * direction
         return points
 
@@ -81,10 +81,10 @@ class Box:
         return self.random_points(rng, layers * per_layer)[None]
 
     def random_points(self, rng: np.random.Generator, count: int) -> Points:
-        """Points (count, 3) m, uniform over the volume, a tenth of them on faces and the eight corners first."""
+        """Points (count, 3) m, half uniform over the volume, half on its faces, the eight corners first."""
         low, high = np.array(self.low), np.array(self.high)
         share = rng.random((count, 3))
-        surface = np.arange(count // 10)
+        surface = np.arange(count // 2)
         share[surface, surface % 3] = np.round(share[surface, surface % 3])
         corners = min(8, count)
         share[:corners] = np.indices((2, 2, 2)).reshape(3, 8).T[:corners]

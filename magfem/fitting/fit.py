@@ -52,10 +52,14 @@ def fit(source: Field | Samples, recipe: Recipe | None = None) -> FieldModel:
     data = sample(field, region, recipe.seed)
     log.info("field: %d sample points", sum(len(one.flat) for one in data.values()))
     tried: list[Fitted] = []
+    most = recipe.most_parameters
     for family in suitable_families(geometry) if recipe.family == SEARCH else [recipe.family]:
         assert family is not None
         candidates = members(family, geometry, region, recipe.family_options(family))
-        tried += climb(candidates, data, recipe.objective, recipe.targets, recipe.most_parameters)
+        found = climb(candidates, data, recipe.objective, recipe.targets, most)
+        tried += found
+        if found and found[-1].score(recipe.targets) <= 0.5:  # what is larger need not be looked at any more
+            most = found[-1].candidate.parameters - 1
     chosen = choose(tried, recipe.targets)
     terms = chosen.terms
     terms.check_sources()

@@ -16,12 +16,12 @@ from magfem.fields.terms import Terms
 from magfem.fields.workspace_region import Ball, Box
 from magfem.fitting.alignment import alignment_of
 from magfem.fitting.candidate import Candidate, Displaceable
-from magfem.fitting.families import SAMPLE_FAMILIES, family_of, members, sample_members
+from magfem.fitting.families import SAMPLE_FAMILIES, family_of, members, sample_members, suitable_families
 from magfem.fitting.families.free import ball_about
 from magfem.fitting.measurement import MeasuredFit, Measurement, solve_measurement
 from magfem.fitting.model import FieldModel
 from magfem.fitting.provenance import versions_and_date
-from magfem.fitting.recipe import DEVICE, Recipe
+from magfem.fitting.recipe import DEVICE, SEARCH, Recipe
 from magfem.geometry import describe
 from magfem.geometry.geometry import Geometry, Magnets
 from magfem.samples import Samples
@@ -72,20 +72,23 @@ def fit_samples(samples: Samples, recipe: Recipe | None = None) -> FieldModel:
     alignment = alignment_of(recipe.free, float(np.linalg.norm(samples.extent)))
     tried: list[Tried] = []
     rows = int(np.count_nonzero(samples.measured))
-    for member in _members(samples, recipe):
-        measurement = Measurement(
-            samples, member, alignment, recipe.background, weighting, recipe.ridge or "evidence", recipe.loss
-        )
-        linear = member.parameters + 3 * recipe.background
-        if linear + len(measurement.free) >= rows or (recipe.most_parameters or rows) < linear:
-            continue
-        solved = solve_measurement(measurement)
-        if not np.isfinite(solved.solved.condition):  # the samples say nothing of some of its parameters
-            continue
-        tried.append(Tried(solved, _predicted(solved, heldout)))
-        best = min(one.score for one in tried)
-        if len(tried) > _WORSE and all(one.score > best for one in tried[-_WORSE:]):
-            break
+    for family in _families(recipe):
+        own: list[Tried] = []
+        for member in _members(family, samples, recipe):
+            measurement = Measurement(
+                samples, member, alignment, recipe.background, weighting, recipe.ridge or "evidence", recipe.loss
+            )
+            linear = member.parameters + 3 * recipe.background
+            if linear + len(measurement.free) >= rows or (recipe.most_parameters or rows) < linear:
+                continue
+            solved = solve_measurement(measurement)
+            if not np.isfinite(solved.solved.condition):  # the samples say nothing of some of its parameters
+                continue
+            own.append(Tried(solved, _predicted(solved, heldout)))
+            best = min(one.score for one in own)
+            if len(own) > _WORSE and all(one.score > best for one in own[-_WORSE:]):
+                break
+        tried += own
     if not tried:
         raise ConvergenceError(
             f"{rows} measured components are too few, or in too few places, for any model of this family; a symmetry "
@@ -96,19 +99,26 @@ def fit_samples(samples: Samples, recipe: Recipe | None = None) -> FieldModel:
     return _model(samples, recipe, tried, chosen, heldout)
 
 
-def _members(samples: Samples, recipe: Recipe) -> Iterator[Candidate | Displaceable]:
-    geometry, family = recipe.geometry, recipe.family
-    if family in SAMPLE_FAMILIES or (family is None and geometry is None):
-        yield from sample_members(family or "interior_harmonics", samples, recipe.options)
+def _families(recipe: Recipe) -> list[str]:
+    """The family that the recipe names, what suits its device or its lack of one, or all that do."""
+    if recipe.family == SEARCH:
+        return suitable_families(recipe.geometry) if recipe.geometry else list(SAMPLE_FAMILIES)
+    if recipe.family is not None:
+        return [recipe.family]
+    return [family_of(recipe.geometry) if recipe.geometry else "interior_harmonics"]
+
+
+def _members(family: str, samples: Samples, recipe: Recipe) -> Iterator[Candidate | Displaceable]:
+    if family in SAMPLE_FAMILIES:
+        yield from sample_members(family, samples, recipe.options)
         return
+    geometry = recipe.geometry
     if geometry is None:
         raise InputError(f"the family {family} needs a device: name one in the recipe")
     if family == DEVICE:
         yield _device(geometry, recipe)
         return
-    name = family or family_of(geometry)
-    region = recipe.region or geometry.region
-    yield from members(name, geometry, region, recipe.family_options(name))
+    yield from members(family, geometry, recipe.region or geometry.region, recipe.family_options(family))
 
 
 def _device(geometry: Geometry, recipe: Recipe) -> Candidate:

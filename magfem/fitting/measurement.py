@@ -22,6 +22,7 @@ Loss: TypeAlias = Literal["squares", "huber"]
 
 _HUBER = 1.345  # standard deviations: 95 % as sharp as plain squares where the noise is normal
 _STEP = 1e-6  # of the bounds' distance, for the derivatives by the free parameters
+_REFINED = 3  # of the starts
 CONDITION = 1e7
 
 
@@ -190,7 +191,7 @@ def solve_measurement(measurement: Measurement) -> MeasuredFit:
 
 
 def _project(measurement: Measurement, weight: Floats, starts: Floats) -> Floats:
-    """The nonlinear parameters (q,) that leave the least, by variable projection from every start."""
+    """The nonlinear parameters (q,) that leave the least, by variable projection from the most promising starts."""
     if not measurement.free:
         return np.empty(0)
     low, high = measurement.bounds
@@ -218,7 +219,7 @@ def _project(measurement: Measurement, weight: Floats, starts: Floats) -> Floats
 
     found = [
         least_squares(residual, start, jacobian, (low, high), x_scale=high - low, xtol=1e-12, ftol=1e-12, gtol=1e-12)
-        for start in starts
+        for start in promising
     ]
     best: Floats = min(found, key=lambda one: float(one.cost)).x
     return best

@@ -7,11 +7,9 @@ A recipe of published coefficients:
     source = "…"
     coefficients = [6.4e-7, 1.9e-8]    # a_k in T·m^(k+2)/A
 
-    [region]                           # about a small ball where the poles are, as in a fit recipe
-    body = "1 mm"                      # its diameter
-    clearance = "30 mm"
-    extent = "140 mm"
-    z = ["30 mm", "140 mm"]            # optional, and rho
+    [region]                           # a ball, in the model's frame
+    centre = ["0 mm", "0 mm", "85 mm"]
+    radius = "55 mm"
 
     [bound]                            # relative errors to be stated, and on which ground
     B = 0.5
@@ -27,13 +25,13 @@ from pathlib import Path
 
 import numpy as np
 
-from magfem.fields.hull import SphereHull
-from magfem.fields.region import Shell
 from magfem.fields.terms import HIGHEST_DEGREE, Terms, harmonics
+from magfem.fields.workspace_region import Ball
 from magfem.fitting.model import FieldModel
 from magfem.fitting.provenance import versions_and_date
 from magfem.geometry.card import Table, read_table
 from magfem.geometry.catalogue import resolve, short_path
+from magfem.geometry.vectors import three_lengths
 from magfem.typing import Floats
 from magfem.units import quoted
 
@@ -116,21 +114,10 @@ def load_published(name_or_path: str | Path) -> FieldModel:
     )
 
 
-def _region(table: Table) -> Shell:
-    """Where the coefficients hold: a shell about a small ball, and its window."""
-    table.only("body", "clearance", "extent", "z", "rho")
-    body, clearance, extent = (table.quantity(key, "length") for key in ("body", "clearance", "extent"))
-    z = _pair(table, "z") if "z" in table else (-inf, inf)
-    rho = _pair(table, "rho") if "rho" in table else (0.0, inf)
-    region = Shell(SphereHull(body), clearance, extent, z, rho)
-    if not (body > 0 and 0 < clearance < extent and region.z[0] < region.z[1] and 0 <= region.rho[0] < region.rho[1]):
-        raise table.error("lengths must be positive, lower limits smaller than upper ones, and rho not negative")
-    return region
-
-
-def _pair(table: Table, key: str) -> tuple[float, float]:
-    value = table.value(key)
-    if not isinstance(value, list) or len(value) != 2:
-        raise table.error(f'{key} must be two lengths, such as ["1 mm", "6 mm"]', key)
-    low, high = (Table(table.origin, {key: one}, table.path).quantity(key, "length") for one in value)
-    return low, high
+def _region(table: Table) -> Ball:
+    """Where the coefficients hold."""
+    table.only("centre", "radius")
+    centre, radius = three_lengths(table, "centre"), table.quantity("radius", "length")
+    if not radius > 0:
+        raise table.error("radius must be positive", "radius")
+    return Ball(centre, radius)

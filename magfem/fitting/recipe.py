@@ -21,6 +21,10 @@ SEARCH, DEVICE = "search", "device"
 """Instead of a family's name: all families that describe the device; for samples, the device's own field, scaled."""
 
 
+_TARGETS = {"winding_loops": (2e-4, 2e-3), "closed_paths": (1e-3, 1e-2)}
+"""Of families that would take very many sources for less, by name: B and gradient."""
+
+
 @dataclass(frozen=True)
 class SamplesFile:
     """Measured samples in a file: its path, what its columns are (`read_samples`), deviations in T or None."""
@@ -37,11 +41,10 @@ class Recipe:
     geometry: the device; None takes the source's.  family: a name of `families.FAMILIES`, or "search" for the best of
     all that describe the device; None takes what suits it.  options: of the family, by name.  region: where the model
     must hold; None takes the device's.  circuit: of a coil with several, by name.  target_B, target_gradient: relative
-    errors to stay below; None takes 5e-5 and 5e-4, for closed paths 1e-3 and 1e-2.  objective: "layers" (B and
+    errors to stay below; None takes 5e-5 and 5e-4, or those of the family in `_TARGETS`.  objective: "layers" (B and
     gradient, near and far alike), "absolute" (B in T, 2.8) or "relative" (every point of B against itself, 5.3).
     most_parameters: None for no limit.  seed: of the sample points.  dimension, resolution: how the command line solves
-    the device first.  name: the model's; None takes the device's.  source: where the recipe's
-    choices come from.
+    the device first.  name: the model's; None takes the device's.  source: where the recipe's choices come from.
 
     For samples: weighting "sigma", "absolute" or "relative" (None: by what they state); ridge "none", "evidence" (the
     default) or "leave-one-out"; loss "squares" or "huber"; heldout "samples" or "regions" (None: by their number);
@@ -86,7 +89,7 @@ class Recipe:
     @property
     def targets(self) -> dict[str, float]:
         """Relative errors to stay below, by quantity."""
-        B, gradient = (1e-3, 1e-2) if self.family == "closed_paths" else (5e-5, 5e-4)
+        B, gradient = _TARGETS.get(self.family or "", (5e-5, 5e-4))
         return {
             "B": B if self.target_B is None else self.target_B,
             "gradient": gradient if self.target_gradient is None else self.target_gradient,

@@ -99,7 +99,7 @@ def test_degree_two_is_the_quadrupole_of_textbooks(order, sine, slope):
 
 
 def test_all_degrees_together_are_a_loop_seen_from_its_centre():
-    """On the axis B_z = B₀ (1 + z²/R²)^{−3/2}, a binomial series; its terms are −l g_l (z/a)^{l−1}. At R/2 2⁻⁶⁴ is left."""
+    """On the axis B_z = B₀ (1 + z²/R²)^{−3/2}, a binomial series; its terms are −l g_l (z/a)^{l−1}."""
     radius, current = 2.5 * A, 3.0
     k = np.arange(32)
     on_axis = MU_0 * current / (2 * radius) * binom(-1.5, k) * (A / radius) ** (2 * k)

@@ -19,7 +19,20 @@ from magfem.typing import Floats
 MOST_NODES = 40_000
 """Of all paths together: more would make a model slower than it is worth."""
 
-_LADDER = ((0.5, 1), (0.5, 2), (0.5, 3), (1.0, 2), (1.0, 3), (1.0, 4), (2.0, 2), (2.0, 3), (2.0, 4), (2.0, 6))
+_LADDER = (
+    (0.5, 1),
+    (0.5, 2),
+    (0.5, 3),
+    (1.0, 2),
+    (1.0, 3),
+    (1.0, 4),
+    (1.4, 2),
+    (1.4, 3),
+    (2.0, 2),
+    (2.0, 3),
+    (2.0, 4),
+    (2.0, 6),
+)
 """Resolutions and filaments across the width, from small models to large ones."""
 
 _ACROSS = 6  # elements over a track's width, at resolution 1, to find the lines of its current

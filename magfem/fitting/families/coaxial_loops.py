@@ -63,17 +63,17 @@ def wall_and_face_loops(geometry: Geometry, region: Shell) -> Iterator[Candidate
 def winding_loops(geometry: Geometry, region: Shell) -> Iterator[Candidate]:
     """Coaxial loops at Gauss–Legendre points of the windows of windings about z; the fit finds their currents.
 
-    The first candidate has one loop for each clearance along the window and across it, or two, and each further one
-    1.3 times as many.
+    The first candidate has one loop for each clearance along the window, or two, and across it, and each further one
+    1.2 times as many.
     """
     windings = windings_of(geometry)
-    density = 1.0
+    density, before = 1.0, 0
     while True:
         centres, radii = [], []
         for winding in windings:
             along = max(2, round(density * winding.length / region.clearance)) if winding.length else 1
             build = winding.outer_radius - winding.inner_radius
-            across = max(1, round(density * build / (2 * region.clearance))) if build else 1
+            across = max(2, round(density * build / (1.3 * region.clearance))) if build else 1
             z = winding.centre + gauss(along, -winding.length / 2, winding.length / 2)
             radius, height = np.meshgrid(gauss(across, winding.inner_radius, winding.outer_radius), z)
             radii.append(radius.ravel())
@@ -81,13 +81,16 @@ def winding_loops(geometry: Geometry, region: Shell) -> Iterator[Candidate]:
         placed = np.concatenate(radii)
         if placed.size > MOST_PARAMETERS or density > 40:
             return
+        density *= 1.2
+        if placed.size == before:
+            continue
+        before = placed.size
         each = "" if len(windings) == 1 else f" of each of {len(windings)} windings"
         yield independent(
             "winding_loops",
             f"{across} × {along} loops in the window{each}",
             loops(np.concatenate(centres), placed, np.ones(placed.size)),
         )
-        density *= 1.3
 
 
 def windings_of(geometry: Geometry) -> list[CoaxialWinding]:

@@ -19,6 +19,10 @@ SPACING = 0.02
 """Least distance of displaced sources, in lengths of the device: nearer ones are one source of a higher order."""
 
 
+_DEPTHS, _GAPS = (0.05, 0.15, 0.25, 0.4), (0.05, 0.15, 0.25, 0.4)
+"""Of the first source and between sources, shares of how far they may go: where the search for places begins."""
+
+
 def axial_multipole(
     geometry: Geometry, region: Shell, poles: int = 6, height: float = 0.0, window: Region | None = None
 ) -> Iterator[Candidate]:
@@ -46,7 +50,7 @@ def displaced_multipoles(
     """
     hull = the_cylinder(geometry)
     size = max(hull.length, hull.diameter / 2)
-    top, bottom = hull.length / 2 - 0.25 * region.clearance, -hull.length / 2 - size
+    top, bottom = hull.length / 2 - 0.25 * region.clearance, -hull.length / 2 - 2 * size
     least = SPACING * size
     for count, order in product(_several(sources), _several(orders)):
 
@@ -67,13 +71,12 @@ def displaced_multipoles(
         reach = top - bottom
         lower = np.concatenate([[0.0], np.full(count - 1, least)])
         upper = np.full(count, reach)
-        shares = (0.15, 0.4, 0.8)
-        start = np.array([np.maximum(np.full(count, share * reach / count), 2 * lower) for share in shares])
+        start = [[depth, *[gap] * (count - 1)] for depth in _DEPTHS for gap in (_GAPS if count > 1 else (0.0,))]
         yield Displaceable(
             f"M = {count}, N = {order}",
             order if shared else order * count,
             make,
-            start,
+            np.maximum(reach * np.array(start), lower),
             lower,
             upper,
             tuple(f"displacement {m + 1}" for m in range(count)),
