@@ -217,6 +217,7 @@ def _project(measurement: Measurement, weight: Floats, starts: Floats) -> Floats
         followed: Floats = one.basis @ (one.basis.T @ slopes)
         return followed - slopes
 
+    promising = sorted(starts, key=lambda start: float(np.sum(residual(start) ** 2)))[:_REFINED]
     found = [
         least_squares(residual, start, jacobian, (low, high), x_scale=high - low, xtol=1e-12, ftol=1e-12, gtol=1e-12)
         for start in promising
