@@ -35,7 +35,9 @@ def noisy(seed: int, true=TRUE, background=BACKGROUND) -> Samples:
 
 
 def test_without_noise_everything_is_found() -> None:
-    fit = solved(Samples(GRID, read_by_sensor(TRUE, background=BACKGROUND)), FREE, background=True, weighting="absolute")
+    fit = solved(
+        Samples(GRID, read_by_sensor(TRUE, background=BACKGROUND)), FREE, background=True, weighting="absolute"
+    )
     np.testing.assert_allclose(fit.theta, [TRUE[name] for name in fit.measurement.free], atol=1e-8)
     np.testing.assert_allclose(fit.solved.parameters[-3:], BACKGROUND, atol=1e-10)
     assert fit.degenerate == ()

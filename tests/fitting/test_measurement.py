@@ -93,7 +93,9 @@ def test_parameters_that_the_noise_hides_are_degenerate() -> None:
 
 
 def test_the_report_names_degenerate_parameters_and_states_no_deviation(ring, shifted_ring, caplog) -> None:
-    recipe = Recipe(geometry=ring, family="axial_multipole", free={"centre_z": (-1e-3, 1e-3), "centre_x": (-1e-3, 1e-3)})
+    recipe = Recipe(
+        geometry=ring, family="axial_multipole", free={"centre_z": (-1e-3, 1e-3), "centre_x": (-1e-3, 1e-3)}
+    )
     with caplog.at_level(logging.WARNING, "magfem"):
         found = magfem.fit(shifted_ring, recipe).report["measurement"]
     assert found["degenerate"] == ["centre_z"]
