@@ -19,8 +19,6 @@ from __future__ import annotations
 
 from math import inf, pi, sqrt
 
-import numpy as np
-
 from magfem.compiled import kernel
 from magfem.fields.loop import (
     PRODUCT,
@@ -35,7 +33,7 @@ from magfem.fields.loop import (
     complete_elliptic,
     ring_integrals,
 )
-from magfem.fields.packing import BLOCK, add_axisymmetric
+from magfem.fields.packing import add_axisymmetric
 from magfem.typing import Floats
 
 
@@ -88,15 +86,14 @@ def _axial_field(rho: float, z: float, radius: float) -> float:
 
 @kernel
 def add_charge_discs(
-    x: Floats, y: Floats, z: Floats, count: int, radius: float, charge: float, order: int, out: Floats
+    x: Floats, y: Floats, z: Floats, count: int, radius: float, charge: float, order: int, work: Floats, out: Floats
 ) -> None:
     """Add one disc's jets, normal z, at `count` points of its own frame to `out` (15, BLOCK), packed.
 
     x, y, z: (BLOCK,) m.  radius: m.  charge: its surface density, T. Infinite or NaN on the rim.
     """
-    work = np.empty((RING_ROWS, BLOCK))
     ring_integrals(x, y, z, count, radius, order, work)
-    profile = np.empty((6, BLOCK))
+    profile = work[RING_ROWS:]
     a2 = radius * radius
     c = charge / (4.0 * pi) * a2  # K µ₀ a²/4π: A_loop/ρ per unit of K is c T(1, 3/2)
     for j in range(count):

@@ -13,11 +13,8 @@ from __future__ import annotations
 
 from math import pi, sqrt
 
-import numpy as np
-
 from magfem.compiled import kernel
 from magfem.constants import MU_0
-from magfem.fields.packing import BLOCK
 from magfem.typing import Floats
 
 # Rows of the work space: unit vector from the node before and distance to it; the same of the node after.
@@ -26,13 +23,12 @@ _A, _B = 0, 4
 
 @kernel
 def add_closed_path(
-    x: Floats, y: Floats, z: Floats, count: int, nodes: Floats, current: float, order: int, out: Floats
+    x: Floats, y: Floats, z: Floats, count: int, nodes: Floats, current: float, order: int, work: Floats, out: Floats
 ) -> None:
     """Add a closed path's jets at `count` points of its own frame to `out` (15, BLOCK), packed.
 
     x, y, z: (BLOCK,) m.  nodes: (v, 3) m, in the direction of the current.  current: A. Infinite or NaN on the path.
     """
-    work = np.empty((8, BLOCK))
     _from_node(x, y, z, count, nodes[nodes.shape[0] - 1], work[_B:])
     for node in range(nodes.shape[0]):
         before = node - 1 if node > 0 else nodes.shape[0] - 1

@@ -31,7 +31,7 @@ import numpy as np
 
 from magfem.compiled import kernel
 from magfem.constants import MU_0
-from magfem.fields.packing import BLOCK, add_axisymmetric
+from magfem.fields.packing import add_axisymmetric
 from magfem.typing import ArrayLike, Floats, Points, Vectors
 
 _SERIES_BELOW, _HESSIAN_SERIES_BELOW = 0.04, 0.12
@@ -245,7 +245,7 @@ RING_ROWS = 15
 def ring_integrals(x: Floats, y: Floats, z: Floats, count: int, radius: float, order: int, work: Floats) -> None:
     """The integrals T of a ring of `radius` at `count` points, and what they are made of, as rows of `work`.
 
-    x, y, z: (BLOCK,) m.  work: (RING_ROWS, BLOCK).  order: of the jet wanted; T(3, 11/2) is there from 2 on.
+    x, y, z: (BLOCK,) m.  work: (RING_ROWS, BLOCK) or more, overwritten.  order: of the jet wanted.
     """
     a2 = radius * radius
     smallest = 1.0
@@ -311,15 +311,14 @@ def _agm_steps(complement: float) -> int:
 
 @kernel
 def add_loops(
-    x: Floats, y: Floats, z: Floats, count: int, radius: float, current: float, order: int, out: Floats
+    x: Floats, y: Floats, z: Floats, count: int, radius: float, current: float, order: int, work: Floats, out: Floats
 ) -> None:
     """Add one loop's jets at `count` points of its own frame to `out` (15, BLOCK), packed; as `add_loop`.
 
-    x, y, z: (BLOCK,) m.
+    x, y, z: (BLOCK,) m.  work: (WORK_ROWS, BLOCK), overwritten.
     """
-    work = np.empty((RING_ROWS, BLOCK))
     ring_integrals(x, y, z, count, radius, order, work)
-    profile = np.empty((6, BLOCK))
+    profile = work[RING_ROWS:]
     a2 = radius * radius
     c = MU_0 / (4.0 * pi) * a2 * current
     for j in range(count):

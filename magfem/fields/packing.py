@@ -14,6 +14,9 @@ from magfem.typing import Floats
 BLOCK = 32
 """Points that kernels work on at a time."""
 
+WORK_ROWS = 24
+"""Rows of the work space (WORK_ROWS, BLOCK) that every kernel of a source may overwrite."""
+
 
 @kernel
 def add_axisymmetric(x: Floats, y: Floats, profile: Floats, count: int, order: int, out: Floats) -> None:

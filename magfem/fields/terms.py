@@ -16,24 +16,12 @@ from scipy.spatial.transform import RigidTransform
 
 from magfem.constants import MU_0
 from magfem.errors import InputError
+from magfem.fields.packed import Packed, pack
 from magfem.fields.packing import BLOCK
-from magfem.fields.solid_harmonics import interior_scale, schmidt_scale
 from magfem.fields.term_kinds import CHARGE_DISC, HARMONIC, INTERIOR, LOOP, OBLATE, PATH
-from magfem.fields.terms_kernel import (
-    CONDUCTOR,
-    DISC,
-    LOOPS,
-    MIXED,
-    MIXED_INTERIOR,
-    OBLATE_DISC,
-    TRANSVERSE_COS,
-    TRANSVERSE_SIN,
-    ZONAL,
-    Packed,
-    evaluate,
-)
+from magfem.fields.terms_kernel import evaluate
 from magfem.threads import in_chunks
-from magfem.typing import ArrayLike, Complexes, Floats, Integers, Jet, Points
+from magfem.typing import ArrayLike, Floats, Integers, Jet, Points
 
 HIGHEST_DEGREE = 80
 """Of harmonics: factorials of twice this, and of the derivatives, still fit a float."""
@@ -173,68 +161,7 @@ class Terms:
     @cached_property
     def packed(self) -> Packed:
         """What the kernel reads."""
-        reals: list[Floats] = []
-        complexes: list[Complexes] = []
-        indices: list[Integers] = []
-        real_count = complex_count = 0
-        expanded: list[tuple[int, int, int, int, float]] = []  # source, how, first, last, value
-        for k in range(self.kind.size):
-            run = slice(int(self.start[k]), int(self.start[k + 1]))
-            degree, order, sine, values = self.degree[run], self.order[run], self.sine[run], self.coefficient[run]
-            kind = self.kind[k]
-            if kind in (LOOP, CHARGE_DISC):
-                expanded.append((k, LOOPS if kind == LOOP else DISC, 0, 0, float(values.sum())))
-            elif kind == PATH:
-                first, last = int(self.node_start[k]), int(self.node_start[k + 1])
-                expanded.append((k, CONDUCTOR, first, last, float(values.sum())))
-            elif kind == OBLATE:
-                dense = np.zeros(int(degree.max()) + 6, dtype=complex)
-                scale = np.array([schmidt_scale(int(l), 0) for l in degree])  # noqa: E741
-                # Re(−i h Q) = h Im Q, as for cosine and sine.
-                np.add.at(dense, 3 + degree, np.where(sine == 1, -1j, 1.0) * scale * values)
-                expanded.append((k, OBLATE_DISC, complex_count, complex_count + dense.size, 0.0))
-                complexes.append(dense)
-                indices.append(np.zeros((dense.size, 2), dtype=np.int64))
-                complex_count += dense.size
-            elif kind == HARMONIC and (np.all(order == 0) or np.all(order == 1)):
-                scale = np.array([schmidt_scale(int(l), int(order[0])) for l in degree])  # noqa: E741
-                for part in (0, 1):
-                    chosen = sine == part
-                    if not chosen.any() or (order[0] == 0 and part == 1):
-                        continue  # sin 0φ is nothing
-                    dense = np.zeros(int(degree.max()) + 6)
-                    np.add.at(dense, 3 + degree[chosen], (scale * values)[chosen])
-                    how = ZONAL if order[0] == 0 else TRANSVERSE_SIN if part else TRANSVERSE_COS
-                    expanded.append((k, how, real_count, real_count + dense.size, 0.0))
-                    reals.append(dense)
-                    real_count += dense.size
-            else:
-                scaling = schmidt_scale if kind == HARMONIC else interior_scale
-                scale = np.array([scaling(int(l), int(m)) for l, m in zip(degree, order, strict=True)])  # noqa: E741
-                sparse = np.where(sine == 1, -1j, 1.0) * scale * values
-                how = MIXED if kind == HARMONIC else MIXED_INTERIOR
-                expanded.append((k, how, complex_count, complex_count + sparse.size, 0.0))
-                complexes.append(sparse)
-                indices.append(np.stack([degree, order], axis=1))
-                complex_count += sparse.size
-        rows = [k for k, *_ in expanded]
-        count = len(rows)
-        layout = np.zeros((count, 5), dtype=np.int64)
-        layout[:, :3] = np.array([one[1:4] for one in expanded], dtype=np.int64).reshape(count, 3)
-        value = np.array([one[4] for one in expanded])
-        frames = self.frame[rows].reshape(count, 9)
-        layout[:, 3] = np.all(frames == np.eye(3).ravel(), axis=1)
-        layout[:-1, 4] = np.any(frames[1:] != frames[:-1], axis=1)
-        layout[-1:, 4] = 1
-        numbers = np.column_stack([self.radius[rows], self.centre[rows], frames, value])
-        return Packed(
-            layout,
-            np.ascontiguousarray(numbers),
-            np.concatenate([*reals, np.empty(0)]),
-            np.concatenate([*complexes, np.empty(0, dtype=complex)]),
-            np.concatenate([*indices, np.empty((0, 2), dtype=np.int64)]),
-            np.ascontiguousarray(self.nodes),
-        )
+        return pack(self)
 
     def jet(self, points: Points, order: int = 1) -> Jet:
         """(B, gradient[, hessian]) at `points` (n, 3) m; `order` 0 gives B alone, 1 and 2 the derivatives."""

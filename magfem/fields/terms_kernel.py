@@ -2,39 +2,27 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from magfem.compiled import kernel
 from magfem.fields.charge_disc import add_charge_discs
 from magfem.fields.closed_path import add_closed_path
 from magfem.fields.loop import add_loops
-from magfem.fields.packing import BLOCK, add_rotated, unpack
+from magfem.fields.packed import (
+    CONDUCTOR,
+    DISC,
+    LOOPS,
+    MIXED_INTERIOR,
+    OBLATE_DISC,
+    TRANSVERSE_COS,
+    TRANSVERSE_SIN,
+    ZONAL,
+)
+from magfem.fields.packing import BLOCK, WORK_ROWS, add_rotated, unpack
 from magfem.fields.solid_harmonics import add_harmonics
 from magfem.fields.transverse_harmonics import add_transverse
 from magfem.fields.zonal_harmonics import add_oblate, add_zonal
 from magfem.typing import Complexes, Floats, Integers, Points
-
-LOOPS, ZONAL, TRANSVERSE_COS, TRANSVERSE_SIN, MIXED, MIXED_INTERIOR, OBLATE_DISC, CONDUCTOR, DISC = range(9)
-"""How a source is evaluated."""
-
-
-class Packed(NamedTuple):
-    """n sources as the kernel reads them.
-
-    layout: (n, 5) how, first and last index into what the source owns, whether its frame is the common one, whether
-    the next source's frame is another.  numbers: (n, 14) radius, centre, frame row by row, coefficient.
-    reals, complexes: coefficients of harmonics.  indices: (c, 2) degrees and orders of mixed harmonics, in step with
-    `complexes`.  nodes: (v, 3) of paths.
-    """
-
-    layout: Integers
-    numbers: Floats
-    reals: Floats
-    complexes: Complexes
-    indices: Integers
-    nodes: Floats
 
 
 @kernel
@@ -51,12 +39,16 @@ def evaluate(
     gradient: Floats,
     hessian: Floats,
 ) -> None:
-    """Write the jets of all sources at `points` (n, 3) to B, gradient and hessian, as far as `order` goes."""
+    """Write the jets of all sources at `points` (n, 3) to B, gradient and hessian, as far as `order` goes.
+
+    The sources are those of `Packed`, in its order.
+    """
     x = np.empty(BLOCK)
     y = np.empty(BLOCK)
     z = np.empty(BLOCK)
     total = np.empty((15, BLOCK))
     turned = np.empty((15, BLOCK))
+    work = np.empty((WORK_ROWS, BLOCK))
     entries = 3 if order == 0 else 8 if order == 1 else 15
     for begin in range(0, points.shape[0], BLOCK):
         count = min(BLOCK, points.shape[0] - begin)
@@ -81,17 +73,17 @@ def evaluate(
                     turned[:entries, :count] = 0.0
                     fresh = False
             if how == LOOPS:
-                add_loops(x, y, z, count, radius, value, order, out)
+                add_loops(x, y, z, count, radius, value, order, work, out)
             elif how == ZONAL:
-                add_zonal(x, y, z, count, radius, reals[first:last], order, out)
+                add_zonal(x, y, z, count, radius, reals[first:last], order, work, out)
             elif how in (TRANSVERSE_COS, TRANSVERSE_SIN):
-                add_transverse(x, y, z, count, radius, reals[first:last], how == TRANSVERSE_SIN, order, out)
+                add_transverse(x, y, z, count, radius, reals[first:last], how == TRANSVERSE_SIN, order, work, out)
             elif how == OBLATE_DISC:
                 add_oblate(x, y, z, count, radius, complexes[first:last], order, out)
             elif how == CONDUCTOR:
-                add_closed_path(x, y, z, count, nodes[first:last], value, order, out)
+                add_closed_path(x, y, z, count, nodes[first:last], value, order, work, out)
             elif how == DISC:
-                add_charge_discs(x, y, z, count, radius, value, order, out)
+                add_charge_discs(x, y, z, count, radius, value, order, work, out)
             else:
                 add_harmonics(
                     x,

@@ -12,10 +12,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-import numpy as np
-
 from magfem.compiled import kernel
-from magfem.fields.packing import BLOCK
 from magfem.typing import Floats
 
 
@@ -29,6 +26,7 @@ def add_transverse(
     coefficients: Floats,
     sine: bool,
     order: int,
+    work: Floats,
     out: Floats,
 ) -> None:
     """Add the jets at `count` points of the source's own frame to `out` (15, BLOCK), packed.
@@ -41,7 +39,9 @@ def add_transverse(
     a = 1.0 / radius
     # Rows: z/r², 1/r², 1/r³; of each column m here and before; from 11 on Σ C Q_l^1 and, with one letter for each
     # derivative, u by s (times −2) and v by z (times −1): p, p_u, p_v, p_uu, p_uv, p_uuu, p_uuv.
-    work = np.zeros((18, BLOCK))
+    for row in range(3, 18):
+        for j in range(count):
+            work[row, j] = 0.0
     for j in range(count):
         height = z[j] * a
         inverse = 1.0 / ((x[j] * x[j] + y[j] * y[j]) * a * a + height * height)

@@ -36,14 +36,21 @@ _RISE, _INVERSE, _DIAGONAL, _SUMS = 0, 1, 2, 11
 
 @kernel
 def add_zonal(
-    x: Floats, y: Floats, z: Floats, count: int, radius: float, coefficients: Floats, order: int, out: Floats
+    x: Floats,
+    y: Floats,
+    z: Floats,
+    count: int,
+    radius: float,
+    coefficients: Floats,
+    order: int,
+    work: Floats,
+    out: Floats,
 ) -> None:
     """Add the jets of an axial multipole at `count` points of its own frame to `out` (15, BLOCK), packed.
 
     x, y, z: (BLOCK,) m.  radius: a, m.  coefficients: (top + 6,) T, C_l at 3 + l, zeros around them. Infinite at the
     centre.
     """
-    work = np.empty((17, BLOCK))
     a = 1.0 / radius
     for j in range(count):
         height = z[j] * a

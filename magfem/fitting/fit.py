@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from magfem.errors import InputError
-from magfem.fem.coil_solution import CoilSolution
+from magfem.fem.coil_solution import CoilSolution, SolvedCircuit
 from magfem.fields.field import Field
 from magfem.fields.region import Everywhere
 from magfem.fields.terms import Terms
@@ -97,7 +97,7 @@ def fit(source: Field | Samples, recipe: Recipe | None = None) -> FieldModel:
                 if not region.windowed and _has_room(candidate, data)
             ],
         },
-        provenance=provenance_of(source, geometry),
+        provenance=provenance_of(source, geometry, _circuit_name(field)),
         unit=field.unit,
     )
 
@@ -131,6 +131,13 @@ def _circuit(source: Field, recipe: Recipe) -> Field:
             'as the recipe\'s "circuit"'
         )
     return source if recipe.circuit is None else source.circuit(recipe.circuit)
+
+
+def _circuit_name(field: Field) -> str | None:
+    """The circuit that a field is of."""
+    if isinstance(field, CoilSolution):
+        return field.circuits[0].name
+    return field.name if isinstance(field, SolvedCircuit) else None
 
 
 def _stated_error(source: Field) -> dict[str, float] | None:

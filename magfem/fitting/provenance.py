@@ -16,11 +16,15 @@ from magfem.version import __version__
 _PACKAGES = ("numpy", "scipy", "numba", "gmsh", "scikit-fem", "pyamg")
 
 
-def provenance_of(source: Field, geometry: Geometry | None) -> dict[str, Any]:
-    """JSON-ready; `solver` and `solution` are None for a source that no finite elements have made."""
+def provenance_of(source: Field, geometry: Geometry | None, circuit: str | None = None) -> dict[str, Any]:
+    """JSON-ready; `solver` and `solution` are None for a source that no finite elements have made.
+
+    circuit: which one of a coil's the field is of.
+    """
     solution = source if isinstance(source, Solution | CoilSolution) else None
     return {
         "device": None if geometry is None else describe(geometry),
+        "circuit": circuit,
         "source": "finite elements" if solution else type(source).__name__,
         "solver": solution and solution.settings,
         "solution": solution and {"error": solution.error, "quantities": solution.quantities, "stats": solution.stats},

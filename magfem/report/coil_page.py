@@ -88,7 +88,7 @@ def context(subject: CoilSubject, place: Workplace) -> dict[str, Any]:
         "subject": subject,
         "solution": solution,
         "place": place,
-        "device": _device(geometry),
+        "device": coil_facts(geometry),
         "card": describe(geometry)["card"],
         "conductors": conductor_numbers(geometry)[: _told(solution)],
         "rows": rows,
@@ -115,7 +115,7 @@ def _told(solution: CoilSolution) -> int:
     return len(solution.circuits) if len(solution.circuits) <= FEW else 1
 
 
-def _device(geometry: Coil) -> dict[str, Any]:
+def coil_facts(geometry: Coil) -> dict[str, Any]:
     """Facts of the device by their names."""
     keys = (*geometry.dimensions, *getattr(geometry, "optional", ()))
     lengths = [(key, getattr(geometry, key)) for key in keys]

@@ -9,11 +9,14 @@ import numpy as np
 
 from magfem.closed_form import exact
 from magfem.errors import InputError
-from magfem.fields import Everywhere, Field
+from magfem.fem import Solution
+from magfem.fields import Everywhere, Field, Shell
 from magfem.fields.terms import Terms
 from magfem.fields.terms_json import terms_from_list
+from magfem.fitting import FieldModel
 from magfem.fitting.families import dissertation_families
 from magfem.geometry import Magnets
+from magfem.report import region_pictures
 from magfem.report.figures import (
     Contender,
     Picture,
@@ -40,37 +43,46 @@ log = logging.getLogger("magfem")
 
 def draw(subject: Subject) -> dict[str, tuple[Picture, ...]]:
     """The pictures of every section by its name; sections without a picture are left out."""
+    geometry, region = subject.geometry, subject.model.region
+    if not isinstance(region, Shell) or region.windowed or subject.model.unit != "T":
+        return region_pictures.draw(subject)
+    if isinstance(geometry, Magnets):
+        return _of_magnets(subject, geometry, region)
+    found = region_pictures.draw(subject)
+    moment = _snapped(subject.model.moment)
+    return {**found, "axis": (axis_figure(subject.model, region, moment, None, None, (), subject.measurements),)}
+
+
+def _of_magnets(subject: Subject, geometry: Magnets, region: Shell) -> dict[str, tuple[Picture, ...]]:
+    """The pictures of a model that holds all round its magnets."""
     found: dict[str, tuple[Picture, ...]] = {}
-    geometry, solution, model = subject.geometry, subject.solution, subject.model
+    truth, model = subject.truth, subject.model
     moment = _snapped(model.moment)
-    if geometry is None:
-        found["axis"] = (axis_figure(model, model.region, moment, None, None, (), subject.measurements),)
-        return found
     shapes = surfaces(geometry)
     log.info("report: device in 3D")
     found["device"] = (device_picture(geometry, shapes),)
-    found["region"] = (region_figure(model.region, shapes),)
+    found["region"] = (region_figure(region, shapes),)
     planes = field_planes(geometry, shapes)
-    if solution is not None:
+    if isinstance(subject.solution, Solution):
         log.info("report: mesh")
-        mesh = solution.mesh
+        mesh = subject.solution.mesh
         found["mesh"] = meridian_figures(mesh) if mesh.dimension == 2 else mesh_pictures(mesh)
     log.info("report: field in two planes")
-    found["planes"] = tuple(field_map(solution or model, shapes, plane) for plane in planes)
+    found["planes"] = tuple(field_map(truth or model, shapes, plane) for plane in planes)
     log.info("report: field along the axis")
-    rivals = _rivals(subject)
+    rivals = _rivals(subject, geometry, region)
     closed_form = _closed_form(geometry)
-    found["axis"] = (axis_figure(model, model.region, moment, solution, closed_form, rivals, subject.measurements),)
-    if solution is not None:
+    found["axis"] = (axis_figure(model, region, moment, truth, closed_form, rivals, subject.measurements),)
+    if truth is not None:
         log.info("report: residuals and comparison")
-        found["residuals"] = _residuals(subject, shapes, planes[0], solution)
-        found["comparison"] = _distances(subject, solution, rivals)
+        found["residuals"] = _residuals(model, geometry, region, shapes, planes[0], truth)
+        found["comparison"] = _distances(model, region, truth, rivals)
         if not geometry.axisymmetric:
-            radius, circle = azimuth_ring(model.region, moment)
+            radius, circle = azimuth_ring(region, moment)
             fields = [(rival.label, rival.terms.jet(circle, 0)[0]) for rival in rivals]
             ours = model.B(circle, outside="extrapolate")
-            found["azimuth"] = (azimuth_figure(radius, solution.B(circle), ours, fields),)
-    return found
+            found["azimuth"] = (azimuth_figure(radius, truth.B(circle), ours, fields),)
+    return {**found, **region_pictures.of_samples(subject)}
 
 
 def _snapped(moment: Floats) -> Floats:
@@ -92,21 +104,22 @@ def _closed_form(geometry: Magnets) -> Field | None:
         return None
 
 
-def _residuals(subject: Subject, shapes: tuple[Surface, ...], plane: Plane, solution: Field) -> tuple[Picture, ...]:
-    model, geometry = subject.model, subject.geometry
+def _residuals(
+    model: FieldModel, geometry: Magnets, region: Shell, shapes: tuple[Surface, ...], plane: Plane, truth: Field
+) -> tuple[Picture, ...]:
     pictures = []
     for derivative, key in enumerate(("B", "gradient")):
         mark = None
-        if geometry is not None and geometry.axisymmetric:  # all azimuths are one: the worst point has a place
-            x, y, z = model.report["worst"][key]["point"]
+        worst = (model.report.get("worst") or {}).get(key)
+        if geometry.axisymmetric and worst is not None:  # all azimuths are one: the worst point has a place
+            x, y, z = worst["point"]
             mark = np.array([np.hypot(x, y), 0.0, z])
-        pictures.append(error_map(model, solution, model.region, shapes, plane, derivative, mark))
+        pictures.append(error_map(model, truth, region, shapes, plane, derivative, mark))
     return tuple(pictures)
 
 
-def _distances(subject: Subject, solution: Field, rivals: list[Rival]) -> tuple[Picture, ...]:
-    model = subject.model
-    distances, points = distance_layers(model.region)
+def _distances(model: FieldModel, region: Shell, truth: Field, rivals: list[Rival]) -> tuple[Picture, ...]:
+    distances, points = distance_layers(region)
     flat = points.reshape(-1, 3)
 
     def contender(label: str, terms: Terms, window: Booleans | None) -> Contender:
@@ -115,18 +128,15 @@ def _distances(subject: Subject, solution: Field, rivals: list[Rival]) -> tuple[
 
     contenders = [contender(f"this model: {model.report['label']}", model.lowered, None)]
     contenders += [contender(rival.label, rival.terms, rival.window.contains(points)) for rival in rivals]
-    return distance_figures(distances, solution.jet(points, 1), contenders, model.report["fem"])
+    return distance_figures(distances, truth.jet(points, 1), contenders, model.report.get("fem"))
 
 
-def _rivals(subject: Subject) -> list[Rival]:
+def _rivals(subject: Subject, geometry: Magnets, region: Shell) -> list[Rival]:
     """The families that the model's report compares it with, and where each is meant to hold."""
-    geometry, entries = subject.geometry, subject.model.report.get("comparison", [])
-    if geometry is None:
-        return []
-    families = dissertation_families(geometry, subject.model.region)
+    families = dissertation_families(geometry, region)
     windows = {one.window.describe(): one.window for one in families if one.window}
     rivals = []
-    for entry in entries:
+    for entry in subject.model.report.get("comparison") or ():
         window = windows.get(entry["window"], Everywhere())
         where = "" if isinstance(window, Everywhere) else f", {entry['window']}"
         author = entry["source"].partition(",")[0]

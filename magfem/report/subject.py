@@ -10,11 +10,13 @@ from pathlib import Path
 from magfem.errors import InputError
 from magfem.fem import Solution, solve
 from magfem.fem.coil_solution import CoilSolution
+from magfem.fields import Field
 from magfem.fitting import FieldModel, fit, load_model
-from magfem.geometry import Magnets, geometry_from_text, load_geometry
+from magfem.geometry import Coil, Geometry, Magnets, geometry_from_text, load_geometry
 from magfem.geometry.card import read_table
 from magfem.geometry.catalogue import is_path, names
 from magfem.report.recipe import Recipe, load_recipe
+from magfem.samples import Samples
 from magfem.samples.single_components import Measurement
 
 log = logging.getLogger("magfem")
@@ -26,15 +28,27 @@ class Subject:
 
     usage: what a reader types to get the model: the name or path of a card or, if `is_model`, of the model.
     solution: None for a model that was not fitted to one; `geometry` is None too when it names no device.
+    samples: measured ones to hold the model against.
     """
 
     title: str
     usage: str
     model: FieldModel
     is_model: bool = False
-    geometry: Magnets | None = None
-    solution: Solution | None = None
+    geometry: Geometry | None = None
+    solution: Solution | CoilSolution | None = None
     measurements: tuple[Measurement, ...] = ()
+    samples: Samples | None = None
+
+    @property
+    def truth(self) -> Field | None:
+        """What to hold the model against: of a coil the model's circuit; scaled as measurements scaled the model."""
+        field: Field | None = self.solution
+        circuit = self.model.provenance.get("circuit")
+        if isinstance(self.solution, CoilSolution) and circuit is not None:
+            field = self.solution.circuit(circuit)
+        factor = (self.model.report.get("scale") or {}).get("factor")
+        return field if field is None or factor is None else factor * field
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,15 +107,16 @@ def _from_card(device: str, recipe: Recipe | None = None) -> Subject | CoilSubje
 
 
 def _from_model(target: str | os.PathLike[str]) -> Subject:
-    """The model as it is; its device is solved again, with the settings it was fitted at, to hold it against."""
+    """The model as it is; its device is solved again, with the settings it was fitted at, to hold it against.
+
+    Not solved again are devices of several circuits when the model does not say which of them it is of.
+    """
     model = load_model(target)  # type: ignore[arg-type]
     device, solver = model.provenance.get("device"), model.provenance.get("solver")
     geometry = geometry_from_text(device["card"]["text"], device["card"]["path"]) if device else None
-    assert geometry is None or isinstance(geometry, Magnets)  # no coil has a model
     solution = None
-    if geometry is not None and solver:
+    circuits = len(geometry.circuits) if isinstance(geometry, Coil) else 1
+    if geometry is not None and solver and (circuits == 1 or model.provenance.get("circuit") is not None):
         log.info("report: solving the model's device again")
-        again = solve(geometry, solver["dimension"], solver["resolution"])
-        assert isinstance(again, Solution)
-        solution = again
+        solution = solve(geometry, solver.get("dimension"), solver["resolution"], conduction=solver.get("conduction"))
     return Subject(model.name, os.fspath(target), model, True, geometry, solution)

@@ -4,19 +4,24 @@ from __future__ import annotations
 
 import logging
 import os
+from dataclasses import replace
 from pathlib import Path
 
 from magfem.errors import InputError
 from magfem.files import write_bytes, write_text
 from magfem.geometry import Coil, Geometry, Magnets
+from magfem.samples import Samples
 
 log = logging.getLogger("magfem")
 
 
-def write_report(target: str | os.PathLike[str], path: str | os.PathLike[str], pdf: bool = False) -> tuple[Path, ...]:
+def write_report(
+    target: str | os.PathLike[str], path: str | os.PathLike[str], pdf: bool = False, samples: Samples | None = None
+) -> tuple[Path, ...]:
     """Write the report of a card, a model or a report recipe (name or path) as one HTML page.
 
-    pdf: also print it, beside the page and with the ending .pdf. Returns the files written.
+    pdf: also print it, beside the page and with the ending .pdf.  samples: to hold the model against. Returns the
+    files written.
     Raises InputError before anything is computed when the place cannot be written or no browser is there to
     print, CardError for a card or recipe that is wrong, MissingProgramError when nothing can be drawn.
     """
@@ -29,7 +34,12 @@ def write_report(target: str | os.PathLike[str], path: str | os.PathLike[str], p
     if pdf:
         find_browser()
     subject = gather(target)
-    write_text(html, render_coil(subject) if isinstance(subject, CoilSubject) else render(subject))
+    if isinstance(subject, CoilSubject):
+        if samples is not None:
+            raise InputError("samples are held against a model: fit one to the coil first")
+        write_text(html, render_coil(subject))
+    else:
+        write_text(html, render(replace(subject, samples=samples)))
     log.info("report: %s", html)
     return (html, print_pdf(html)) if pdf else (html,)
 

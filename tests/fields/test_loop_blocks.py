@@ -8,7 +8,7 @@ import pytest
 from references.jets import cylindrical, relative, scattered
 
 from magfem.fields.loop import add_loop, add_loops
-from magfem.fields.packing import BLOCK
+from magfem.fields.packing import BLOCK, WORK_ROWS
 from magfem.fields.terms import loops
 from magfem.typing import Floats, Points
 
@@ -39,7 +39,7 @@ def in_blocks(points: Points, order: int) -> Floats:
         x, y, z = np.full((3, BLOCK), np.nan)  # what lies beyond `count` must not be read
         x[: len(piece)], y[: len(piece)], z[: len(piece)] = piece.T
         out = np.zeros((15, BLOCK))
-        add_loops(x, y, z, len(piece), RADIUS, CURRENT, order, out)
+        add_loops(x, y, z, len(piece), RADIUS, CURRENT, order, np.empty((WORK_ROWS, BLOCK)), out)
         assert not out[:, len(piece) :].any() and not out[ENTRIES[order] :].any()
         packed.append(out[:, : len(piece)].T)
     return np.concatenate(packed)
@@ -75,7 +75,7 @@ def test_blocks_match_magpylib_in_all_regimes():
 def test_kernels_add_to_what_is_there():
     points = mixed()[:BLOCK]
     out = np.ones((15, BLOCK))
-    add_loops(*points.T.copy(), BLOCK, RADIUS, CURRENT, 2, out)
+    add_loops(*points.T.copy(), BLOCK, RADIUS, CURRENT, 2, np.empty((WORK_ROWS, BLOCK)), out)
     np.testing.assert_array_equal(out.T, 1 + in_blocks(points, 2))
 
 

@@ -10,14 +10,8 @@ from scipy.stats import kstest
 
 from magfem.errors import InputError
 from magfem.fields.hull import CylinderHull, hull_from_dict, hull_to_dict
-from magfem.fields.region import (
-    Everywhere,
-    Intersection,
-    PlacedRegion,
-    Shell,
-    region_from_dict,
-    region_to_dict,
-)
+from magfem.fields.region import Everywhere, Intersection, PlacedRegion, Shell
+from magfem.fields.region_json import region_from_dict, region_to_dict
 
 DISC = CylinderHull(diameter=4e-3, length=1e-3)
 PIN = CylinderHull(diameter=1e-3, length=3e-3)

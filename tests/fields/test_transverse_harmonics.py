@@ -9,8 +9,8 @@ from references.jets import assert_harmonic, cylindrical, errors, relative, scat
 from scipy.special import eval_legendre
 
 from magfem.constants import MU_0
+from magfem.fields.packed import MIXED, TRANSVERSE_COS, TRANSVERSE_SIN, ZONAL
 from magfem.fields.terms import Terms, harmonics, loops
-from magfem.fields.terms_kernel import MIXED, TRANSVERSE_COS, TRANSVERSE_SIN, ZONAL
 from magfem.fields.uniform_cylinder import cylinder_jet
 from magfem.typing import Floats, Points
 

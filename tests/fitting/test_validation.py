@@ -16,8 +16,9 @@ from magfem.errors import InputError, MagfemError, OutsideRegionError
 from magfem.fields import Evaluated, Everywhere
 from magfem.fields.norms import relative_errors
 from magfem.fields.terms import harmonics
-from magfem.fitting import validate
+from magfem.fitting import Recipe, validate
 from magfem.geometry import AXIAL, DIAMETRIC, CylinderMagnet, PermanentMagnet, RingMagnet
+from magfem.samples import Samples
 
 
 class PerAmpere(Evaluated):
@@ -158,3 +159,129 @@ def test_the_bound_holds_on_the_axis_and_at_the_rims(ring_model, ring):
             assert np.median(error) <= ring_model.report["bound"][key]
             strong = np.sqrt(np.sum(truth**2, axes)) > 0.3 * np.sqrt(np.sum(truth**2, axes)).max()
             assert error[strong].max() <= ring_model.report["bound"][key]
+
+
+# Samples, made by magpylib with noise that is known
+
+
+def noisy(peer, points, sigma, seed=5):
+    B = peer.getB(points)
+    return Samples(points, B + np.random.default_rng(seed).normal(scale=sigma, size=B.shape), sigma, source="magpylib")
+
+
+def test_noise_of_magpylibs_samples_is_found_again(ring_model, ring_peer, ring_points):
+    """6144 components: their root mean square in deviations is 1 ± 0.9 %; the noise is no fault of the model."""
+    found = validate(ring_model, noisy(ring_peer, ring_points.reshape(-1, 3), 1e-4))
+    assert found.found["B"]["standardised"] == pytest.approx(1.0, abs=0.03)
+    assert found.found["B"]["absolute_rms"] == pytest.approx(np.sqrt(3) * 1e-4, rel=0.03)
+    assert found.found["B"]["max"] > found.bound["B"] >= found.found["B"]["beyond_noise"] and found.passed
+    assert found.found["gradient"] is None and found.worst["gradient"] is None and found.outside == 0
+
+
+def test_samples_without_noise_meet_the_bound_of_the_norm(ring_model, ring_peer, ring_points):
+    """And without stated deviations all of the difference counts."""
+    points = ring_points.reshape(-1, 3)
+    B = ring_peer.getB(points)
+    assert validate(ring_model, Samples(points, B)).passed
+    wrong = validate(ring_model, Samples(points, 1.01 * B))
+    assert not wrong.passed and "standardised" not in wrong.found["B"]
+    strong = wrong.found["B"]["rms"]
+    assert strong == pytest.approx(0.01 / 1.01, rel=0.05)
+
+
+def test_one_percent_too_much_shows_through_the_noise(ring_model, ring_peer, ring_points):
+    points = ring_points.reshape(-1, 3)
+    samples = noisy(ring_peer, points, 1e-5)
+    assert validate(ring_model, samples).passed
+    assert not validate(ring_model, Samples(points, 1.01 * samples.B, 1e-5)).passed
+
+
+def test_probe_of_one_axis_is_enough(ring_model, ring_peer, ring_points):
+    points = ring_points.reshape(-1, 3)
+    B = ring_peer.getB(points)
+    B[:, :2] = np.nan
+    found = validate(ring_model, Samples(points, B, 1e-6))
+    assert found.passed and found.found["B"]["max"] <= found.bound["B"]
+
+
+def test_samples_outside_the_region_are_counted_and_left_out(ring_model, ring_peer, ring_points):
+    points = np.concatenate([ring_points.reshape(-1, 3)[:500], [[0, 0, 0.02], [0.5, 0, 0]]])
+    found = validate(ring_model, Samples(points, ring_peer.getB(points)))
+    assert (found.points, found.outside) == (500, 2) and found.passed
+    with pytest.raises(InputError, match="none of the 2 samples lies in the model's region"):
+        validate(ring_model, Samples(points[-2:], ring_peer.getB(points[-2:])))
+
+
+def test_bound_is_kept_against_magpylibs_field(ring_model, ring_peer, ring_points):
+    """B and, by central differences of it, the gradient."""
+    B, gradient = ring_model.jet(ring_points)
+    h = 1e-7
+    slopes = [(ring_peer.getB(ring_points + h * e) - ring_peer.getB(ring_points - h * e)) / (2 * h) for e in np.eye(3)]
+    truth = ring_peer.getB(ring_points), np.stack(slopes, axis=-1)
+    for ours, theirs, key in zip((B, gradient), truth, ("B", "gradient"), strict=True):
+        assert relative_errors(ours, theirs).max() <= ring_model.report["bound"][key]
+
+
+def test_measured_model_is_seen_through_its_own_alignment(ring_peer, ring):
+    """The magnet sits 0.3 mm off and a background was measured too: only with both do the samples fit."""
+    points = np.random.default_rng(8).uniform(-5e-3, 5e-3, (400, 3))
+    points[:, 2] = np.abs(points[:, 2]) + 1.5e-3
+    shifted, background = np.array([3e-4, 0, -1e-4]), np.array([1e-4, -2e-4, 5e-5])
+    B = ring_peer.getB(points - shifted) + background
+    samples = Samples(points, B + np.random.default_rng(9).normal(scale=2e-5, size=B.shape), 2e-5, source="bench.csv")
+    model = magfem.fit(samples, Recipe(geometry=ring, family="device", free={"centre": None}, background=True))
+    found = validate(model, samples)
+    assert found.aligned and found.passed
+    assert found.found["B"]["standardised"] == pytest.approx(1.0, abs=0.1)
+    assert not validate(model, samples, aligned=False).passed
+
+
+def test_samples_of_another_unit_are_refused(ring_model):
+    with pytest.raises(InputError, match="cannot be held against samples in T/A"):
+        validate(ring_model, Samples(np.array([[0, 0, 3e-3]]), np.ones((1, 3)), unit="T/A"))
+
+
+# Several places, and distance
+
+
+def test_worst_points_are_apart_and_in_order(rotor_model, rotor_field):
+    found = validate(rotor_model, rotor_field)
+    for key in ("B", "gradient"):
+        places = np.array([one["point"] for one in found.worst_points[key]])
+        errors = [one["error"] for one in found.worst_points[key]]
+        assert (
+            len(places) >= 3
+            and errors == sorted(errors, reverse=True)
+            and found.worst_points[key][0] == found.worst[key]
+        )
+        between = np.linalg.norm(places[:, None] - places[None], axis=-1)[np.triu_indices(len(places), 1)]
+        assert between.min() > 5e-3  # of a region 110 mm wide
+
+
+def test_errors_by_distance_hold_the_whole_and_know_where_it_is(rotor_model, rotor_field):
+    """A dipole added in the middle errs like r⁻³ beside a field that falls likewise: by one share at all distances."""
+    found = validate(rotor_model, 1.01 * rotor_field)
+    groups = found.by_distance["B"]
+    distances = [group["distance"] for group in groups]
+    assert distances == sorted(distances) and distances[0] >= 2e-3 and distances[-1] <= 50e-3
+    assert max(group["max"] for group in groups) == found.found["B"]["max"]
+    np.testing.assert_allclose([group["rms"] for group in groups], 0.01 / 1.01, rtol=0.02)
+
+
+def test_workspaces_count_distance_from_their_middle():
+    """A model of samples in a uniform gradient, in a ball: the exact field has its own error everywhere."""
+    rng = np.random.default_rng(3)
+    points = rng.normal(size=(80, 3))
+    points *= 0.04 / np.linalg.norm(points, axis=1, keepdims=True)
+    slope = np.diag([1.0, 1.0, -2.0])
+    model = magfem.fit(Samples(points, points @ slope + rng.normal(scale=1e-5, size=points.shape), 1e-5, source="g"))
+
+    class Gradient(Evaluated):
+        region, unit = Everywhere(), "T"
+
+        def evaluate(self, where, order):
+            return (where @ slope, np.broadcast_to(slope, (*where.shape, 3)))[: order + 1]
+
+    found = validate(model, Gradient())
+    assert found.passed and found.distance_from == "the middle of the region"
+    assert max(group["distance"] for group in found.by_distance["B"]) <= 0.0401

@@ -192,7 +192,7 @@ def test_a_model_without_a_device_still_has_a_page(report: Report) -> None:
         report={**model.report, "fem": None, "comparison": []},
     )
     found = Page(page.render(Subject("A fit", "a.json", bare, is_model=True)))
-    assert set(found.images) == {"axis"}
+    assert set(found.images) == {"axis", "region_xz", "region_yz", "field_xz", "field_yz"}
     assert [row for row in found.rows["error-table"] if row][-1] == list(model.report["bound"].values())
 
 

@@ -48,11 +48,11 @@ def distance_layers(region: Shell) -> tuple[Floats, Floats]:
 
 
 def distance_figures(
-    distances: Floats, truth: Jet, contenders: Sequence[Contender], stated: dict[str, float]
+    distances: Floats, truth: Jet, contenders: Sequence[Contender], stated: dict[str, float] | None
 ) -> tuple[Picture, Picture]:
     """Largest relative error per distance, for B and for the gradient.
 
-    truth : the FEM solution's (B, gradient) at points (l, p, 3).  stated : its own error, drawn as a floor.
+    truth : the FEM solution's (B, gradient) at points (l, p, 3).  stated : its own error, drawn as a floor, if known.
     """
     pictures = []
     for derivative, (key, what) in enumerate((("B", "B"), ("gradient", "the gradient"))):
@@ -67,7 +67,8 @@ def distance_figures(
                     style = {"color": RIVALS[rival % 5], "linestyle": DASHES[rival % 5]}
                     rival += 1
                 axes.plot(distances * MILLI, errors, label=wrapped(contender.label), **style)
-            axes.axhline(stated[key], color=GREY, linewidth=1, label="FEM's own stated error")
+            if stated is not None:
+                axes.axhline(stated[key], color=GREY, linewidth=1, label="FEM's own stated error")
             axes.set(xscale="log", yscale="log", xlabel="distance from the hull (mm)")
             axes.set_ylabel(f"largest relative error of {what}")
             percent_log(axes.yaxis)

@@ -1,10 +1,12 @@
-"""Where a model holds: the device, the clearance around it and the outer limit, to scale."""
+"""Where a model holds: the device and the region around it, to scale."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from magfem.fields import Shell
+from magfem.fields.region import SampledRegion
+from magfem.report.figures.cuts import Cut, draw_region, frame_cut
 from magfem.report.figures.planes import Plane, outline
 from magfem.report.figures.style import BLUE, INK, Picture, drawing, figure, length, png
 from magfem.report.surface import Surface
@@ -13,7 +15,7 @@ MILLI = 1e3
 
 
 def region_figure(region: Shell, surfaces: tuple[Surface, ...]) -> Picture:
-    """The region in the xz plane, to scale."""
+    """A shell all round in the xz plane, to scale."""
     plane = Plane("x", "z", 1.08 * (region.hull.radius + region.extent))
     side, points = plane.points(500)
     distance = region.hull.distance(points)
@@ -45,4 +47,22 @@ def region_figure(region: Shell, surfaces: tuple[Surface, ...]) -> Picture:
         content,
         f"The region of validity in the xz plane: from {near} to {far} around the device's hull.",
         f"The model holds in the shaded part of space: {near} to {far} from the device's convex hull, all round.",
+    )
+
+
+def region_cut_figure(region: SampledRegion, cut: Cut) -> Picture:
+    """A region of any kind in one plane, to scale, the device's hull in grey."""
+    ratio = (cut.high[1] - cut.low[1]) / (cut.high[0] - cut.low[0])
+    with drawing():
+        drawn = figure(float(np.clip(0.7 + 3.6 * ratio, 1.8, 4.4)))
+        axes = drawn.add_subplot()
+        hull = draw_region(axes, region, cut, filled=True)
+        frame_cut(axes, cut)
+        content = png(drawn)
+    device = " Grey: the device's hull." if hull else ""
+    return Picture(
+        f"region_{cut.horizontal}{cut.vertical}",
+        content,
+        f"The region of validity in the {cut.words}: {region.describe()}.",
+        f"The model holds in the shaded part of the {cut.words}.{device}",
     )

@@ -18,6 +18,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator
 
 WIDTH = 4.6  # inches; about a phone's width, so that the lettering stays legible there
 DPI = 200
+_SHORT = 80.0  # ratio of a logarithmic axis' ends up to which whole decades are too few labels
 
 # Okabe and Ito's palette: told apart by colour-blind readers, and in grey by lightness.
 BLUE, ORANGE, GREEN, PURPLE = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
@@ -102,8 +103,9 @@ def plain_log(axis: Any, fine: bool = False) -> None:
 
 
 def percent_log(axis: Any) -> None:
-    """Label a logarithmic axis of relative errors in percent: 1 %, 0.1 %, down to 10⁻⁶ %."""
-    axis.set_major_locator(LogLocator(10, numticks=9))
+    """Label a logarithmic axis of relative errors in percent: 1 %, 0.1 %, down to 10⁻⁶ %; a short one 1, 2, 5 %."""
+    low, high = axis.get_view_interval()
+    axis.set_major_locator(LogLocator(10, subs=(1, 2, 5) if 0 < high < _SHORT * low else (1,), numticks=9))
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{_tick(100 * value)} %"))
 
 
