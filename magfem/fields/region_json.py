@@ -37,14 +37,14 @@ def region_from_dict(data: dict[str, Any]) -> Region:
         return Everywhere()
     if data.get("kind") == "shell":
         window = {name: _pair(data[name]) for name in ("z", "rho") if name in data}
-        shell = Shell(hull_from_dict(data["hull"]), number(data["clearance"]), number(data["extent"]), **window)
+        shell = Shell(hull_from_dict(data["hull"]), _length(data, "clearance"), _length(data, "extent"), **window)
         if not 0 <= shell.clearance < shell.extent < math.inf:
             raise InputError("a shell needs a clearance of 0 or more and a larger extent")
         if not (shell.z[0] < shell.z[1] and 0 <= shell.rho[0] < shell.rho[1]):
             raise InputError("a window needs a lower and a larger upper limit of z and of rho, these 0 or more")
         return shell
     if data.get("kind") == "ball":
-        return Ball(_three(data["centre"]), number(data["radius"]))
+        return Ball(_three(data["centre"]), _length(data, "radius"))
     if data.get("kind") == "box":
         return Box(_three(data["low"]), _three(data["high"]))
     raise InputError(f"unknown region kind {data.get('kind')!r}; known: everywhere, shell, ball, box")
@@ -53,6 +53,13 @@ def region_from_dict(data: dict[str, Any]) -> Region:
 def _bounds(pair: tuple[float, float]) -> list[float | None]:
     """Limits as JSON has them, which knows no infinity."""
     return [value if math.isfinite(value) else None for value in pair]
+
+
+def _length(data: dict[str, Any], key: str) -> float:
+    try:
+        return number(data[key])
+    except ValueError:
+        raise InputError(f"{key} must be a finite number of metres") from None
 
 
 def _pair(data: Any) -> tuple[float, float]:

@@ -245,7 +245,7 @@ def _judged(measurement: Measurement, theta: Floats, solved: LeastSquares, weigh
     free = ~_degenerate(measurement, theta, solved, weight, scaled, length)
     kept = np.concatenate([np.ones(told.size, dtype=bool), free])
     # The ridge is the prior of the linear parameters, in the same units as in `solve_least_squares`.
-    prior = np.sqrt(solved.ridge) * np.eye(np.count_nonzero(kept))[: told.size]
+    prior = np.sqrt(solved.ridge) * np.eye(int(np.count_nonzero(kept)))[: told.size]
     _, s, vt = linalg.svd(np.vstack([scaled[:, kept], prior]), full_matrices=False)
     root = vt.T / np.maximum(s, np.finfo(float).tiny)
     covariance = np.full((parameters, parameters), np.nan)

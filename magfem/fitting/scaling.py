@@ -41,8 +41,8 @@ class Scale:
 def scale_to(model: FieldModel, measurements: Sequence[Measurement]) -> Scale:
     """The factor that fits single components best, each weighted by its uncertainty, or by its size without one.
 
-    Raises InputError for none, for components that the model says vanish, and where nothing says how sure the factor is:
-    a single measurement or one of zero without an uncertainty; OutsideRegionError outside the model's region.
+    Raises InputError for none, for components that the model says vanish, and where nothing says how sure the factor
+    is: a single measurement or one of zero without an uncertainty; OutsideRegionError outside the model's region.
     """
     if not measurements:
         raise InputError("a scale needs one measurement or more")

@@ -94,7 +94,7 @@ def test_points_follow_from_their_seed(region) -> None:
 
 
 def test_windows_without_room_are_refused() -> None:
-    with pytest.raises(InputError, match="hardly any point lies in the region: 0.5 to 6 mm .* z ≥ 20 mm"):
+    with pytest.raises(InputError, match=r"hardly any point lies in the region: 0.5 to 6 mm .* z ≥ 20 mm"):
         replace(SHELL, z=(20e-3, math.inf)).layers(np.random.default_rng(0), 4, 5)
 
 
@@ -167,7 +167,7 @@ def test_damaged_regions_are_refused_by_the_model_file(data, tmp_path) -> None:
     whole = load_model("ring_magnet_4x1.5x1").to_dict()
     path = tmp_path / "damaged.json"
     path.write_text(json.dumps({**whole, "region": data}))
-    with pytest.raises(CardError, match="not a whole field model: .*: region]") as refused:
+    with pytest.raises(CardError, match=r"not a whole field model: .*: region]") as refused:
         load_model(path)
     assert "\n" not in str(refused.value)
 

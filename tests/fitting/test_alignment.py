@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from fitting.sensed_magnet import GRID, deviations_away, read_by_sensor, solved
 
 from magfem.errors import InputError
 from magfem.fitting.alignment import ALIASES, GROUPS, NAMES, Alignment, alignment_of
 from magfem.samples import Samples
-from fitting.sensed_magnet import GRID, deviations_away, read_by_sensor, solved
 
 NOISE = 2e-5
 BACKGROUND = (30e-6, -10e-6, 45e-6)

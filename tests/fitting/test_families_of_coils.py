@@ -218,7 +218,10 @@ def test_oblate_discs_describe_a_flat_magnet(disc) -> None:
 def test_displaced_multipoles_are_found_where_they_are(disc, shared) -> None:
     """Two sources of two poles on the axis, with coefficients of their own or, as 5.2 is printed, shared."""
     heights, own = (0.3e-3, -1.1e-3), ((0.5, 0.1), (0.5, 0.1) if shared else (0.3, -0.2))
-    terms = [harmonics(disc.hull.radius, [1, 2], [0, 0], [False, False], a, (0, 0, z)) for z, a in zip(heights, own)]
+    terms = [
+        harmonics(disc.hull.radius, [1, 2], [0, 0], [False, False], values, (0, 0, height))
+        for height, values in zip(heights, own, strict=True)
+    ]
     points = disc.region.layers(np.random.default_rng(8), 20, 20).reshape(-1, 3)
     B = sum(one.jet(points, 0)[0] for one in terms)
     member = next(displaced_multipoles(disc, disc.region, sources=2, orders=2, shared=shared))

@@ -199,7 +199,7 @@ def test_a_background_is_no_source(noisy_ring, ring_solution) -> None:
     """A static field in the samples is found as such and is no part of the model."""
     region = ring_solution.geometry.region
     points = region.layers(np.random.default_rng(1), 30, 20).reshape(-1, 3)
-    B = ring_solution.B(points) + (2e-4, -1e-4, 5e-4)
+    B = ring_solution.B(points) + np.array([2e-4, -1e-4, 5e-4])
     noisy = B + 2e-5 * np.random.default_rng(0).normal(size=B.shape)
     model = magfem.fit(Samples(points, noisy, 2e-5), Recipe(geometry=ring_solution.geometry, background=True))
     found = model.report["measurement"]["background"]
@@ -215,8 +215,9 @@ def test_without_a_device_the_model_holds_where_the_samples_are(grid) -> None:
     B, _ = cubic(grid)
     model = magfem.fit(Samples(grid, B))
     assert isinstance(model.region, Ball) and model.region.contains(grid).all()
-    outside = magfem.fit(Samples(grid + (0, 0, 0.1), B, 1e-5), Recipe(family="exterior_harmonics"))
-    assert isinstance(outside.region, Box) and outside.region.contains(grid + (0, 0, 0.1)).all()
+    above = grid + np.array([0, 0, 0.1])
+    outside = magfem.fit(Samples(above, B, 1e-5), Recipe(family="exterior_harmonics"))
+    assert isinstance(outside.region, Box) and outside.region.contains(above).all()
 
 
 def test_models_of_samples_come_back_from_their_file(noisy_grid, tmp_path) -> None:

@@ -1,4 +1,4 @@
-"""Separable fits of measurements: what is degenerate, outliers, single components, bounds, weights, places of sources."""
+"""Separable fits of measurements: degenerate parameters, outliers, single components, bounds, weights, places."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from itertools import pairwise
 import magpylib
 import numpy as np
 import pytest
+from fitting.sensed_magnet import DISC, GRID, deviations_away, read_by_sensor, solved
 
 import magfem
 from magfem.fitting import Recipe
@@ -16,7 +17,6 @@ from magfem.fitting.alignment import alignment_of
 from magfem.fitting.families import axial_multipole, charged_faces, displaced_multipoles, wall_and_face_loops
 from magfem.fitting.measurement import Measurement, solve_measurement
 from magfem.samples import Samples
-from fitting.sensed_magnet import DISC, GRID, deviations_away, read_by_sensor, solved
 
 NOISE = 2e-5
 CENTRE = {"centre_x": 0.6e-3, "centre_y": -0.4e-3, "centre_z": 0.3e-3}
@@ -76,7 +76,7 @@ def test_axial_offset_of_known_faces_is_found(ring, shifted_ring) -> None:
 
 def test_a_dipole_has_a_centre() -> None:
     """One pole alone cannot stand in for its own offset."""
-    points = GRID + (0, 0, 10e-3)
+    points = GRID + np.array([0, 0, 10e-3])
     dipole = magpylib.misc.Dipole(moment=(0, 0, 0.1), position=(0, 0, 0.5e-3))
     samples = Samples(points, disturbed(dipole.getB(points), noise=1e-6), 1e-6)
     fit = along_the_axis(samples, next(axial_multipole(DISC, DISC.region, 1)))

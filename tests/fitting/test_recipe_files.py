@@ -219,7 +219,7 @@ def test_faults_are_one_sentence_with_file_and_key(text: str, words: str, where:
 
 
 def test_samples_that_are_not_there_are_named(tmp_path: Path) -> None:
-    with pytest.raises(MagfemError, match="gone.csv") as refused:
+    with pytest.raises(MagfemError, match=r"gone\.csv") as refused:
         model_from_recipe(written(tmp_path, '[samples]\nfile = "gone.csv"\n'))
     assert "\n" not in str(refused.value)
 
