@@ -17,7 +17,8 @@ from magfem.units import describe, quoted
 SECTION = "geometries/systems"
 """The catalogue's folder of systems."""
 
-_READERS = {".toml": read_system_card, ".yaml": read_mpem, ".yml": read_mpem, ".json": read_system}
+READERS = {".toml": read_system_card, ".yaml": read_mpem, ".yml": read_mpem, ".json": read_system}
+"""What reads a system's file, by its ending."""
 
 
 def load_system(name_or_path: str | os.PathLike[str]) -> CoilSystem:
@@ -28,14 +29,14 @@ def load_system(name_or_path: str | os.PathLike[str]) -> CoilSystem:
     """
     if not isinstance(name_or_path, str | os.PathLike):
         raise InputError(f'load_system takes a name or path: "bigmag", got {describe(name_or_path)}')
-    if any(is_path(name_or_path, ending) for ending in _READERS):
+    if any(is_path(name_or_path, ending) for ending in READERS):
         path = Path(name_or_path)
-        if path.suffix not in _READERS:
+        if path.suffix not in READERS:
             raise InputError(
                 "a coil system is a card (.toml), a system file (.json) or an MPEM file (.yaml), "
                 f"got {quoted(str(path))}"
             )
-        return _READERS[path.suffix](path, str(path))
+        return READERS[path.suffix](path, str(path))
     name, known = os.fspath(name_or_path), names(SECTION, ".toml")
     if name not in known:
         nearest = get_close_matches(name, known, n=1, cutoff=0.0)

@@ -18,6 +18,7 @@ from magfem.actuation.coil_system import CoilSystem
 from magfem.actuation.harmonic_fit import as_harmonics
 from magfem.actuation.mpem import OFFSET
 from magfem.errors import ConvergenceError, InputError
+from magfem.exchange.about import facts
 from magfem.fields.field import Field
 from magfem.fields.region import Region, Shell
 from magfem.fields.terms import Terms
@@ -102,8 +103,7 @@ def _parts(source: CoilSystem | Field) -> tuple[str, dict[str, Terms], Region]:
     terms: Terms | None = getattr(source, "lowered", None)
     if not isinstance(source, Field) or terms is None:
         raise InputError("write_mpem takes a coil system, a fitted model, or a field made of such")
-    name = str(getattr(source, "name", "field"))
-    return name, {"Coil_0" if source.unit == "T/A" else OFFSET: terms}, source.region
+    return facts(source)["name"], {"Coil_0" if source.unit == "T/A" else OFFSET: terms}, source.region
 
 
 def _labels(names: list[str]) -> list[str]:

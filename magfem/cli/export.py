@@ -1,4 +1,4 @@
-"""`magfem export`: a field model for another program."""
+"""`magfem export`: a field model, or a coil system, for another program."""
 
 from __future__ import annotations
 
@@ -21,17 +21,26 @@ if TYPE_CHECKING:
     from magfem.fields import Field
     from magfem.typing import Points
 
-Write = Callable[["Field", Path, Namespace], dict[str, Any]]
-"""Writes a field to a file; what --json prints besides: `output`, if there is more than one file, and so on."""
+Corner = tuple[float, float, float]
+Write = Callable[[Any, Path, Namespace], dict[str, Any]]
+"""Writes a field (or, where that is a target's choice, a coil system) to a file; what --json prints besides.
+
+`beside` are more files, `remark` is a word about the result for people.
+"""
 
 
 @dataclass(frozen=True)
 class Target:
-    """What a model can be exported to. ending: of its file.  options: those that it takes, by their names."""
+    """What a model can be exported to.
+
+    ending: of its file.  options: those that it takes, by their names.  of_coils: whether the format is one of coil
+    systems, which may come whole, and whose fields are always per ampere.
+    """
 
     write: Write
     ending: str
     options: frozenset[str] = frozenset()
+    of_coils: bool = False
 
 
 def add(commands: CommandLine) -> None:
@@ -44,7 +53,8 @@ def add(commands: CommandLine) -> None:
         "  magpylib   .py   a module whose `source` is a CustomSource\n"
         "  mat        .mat  for MATLAB and Octave, with magfem_field.m beside it, which evaluates it\n"
         "  c          .h    one header, C99 or C++, with the numbers and what evaluates them\n"
-        "  mpem       .yaml axial multipoles, as mag_manip reads them; what is none is fitted, with its residual\n"
+        "  mpem       .yaml axial multipoles, as mag_manip reads them, of a model or a coil system; terms that are\n"
+        "                   none are fitted, with their residual\n"
         "  vti        .vti  a regular grid for ParaView\n"
         "  vtu        .vtu  points for ParaView\n"
         "  samples    .csv  x,y,z,Bx,By,Bz\n"
@@ -55,9 +65,10 @@ def add(commands: CommandLine) -> None:
             "magfem export ring.json --to magpylib -o ring.py",
             'magfem export ring.json --to vti -o ring.vti --grid 81 --bounds "-4 mm, 4 mm, -4 mm, 4 mm, 1 mm, 6 mm"',
             "magfem export ring.json --to samples -o ring.csv --points points.csv --gradient",
+            "magfem export bigmag --to mpem -o bigmag.yaml",
         ],
     )
-    parser.add_argument("model", metavar="MODEL", help="field model: a name or a path; mpem: also a coil system's file")
+    parser.add_argument("model", metavar="MODEL", help="field model (mpem: also a coil system): a name or a path")
     parser.add_argument("--to", choices=tuple(TARGETS), required=True, help="the other program")
     parser.add_argument("-o", "--output", metavar="FILE", required=True, help="the file to write")
     parser.add_argument("--current", metavar="A", type=float, help="a coil's current in A: the export is then in T")
@@ -66,7 +77,8 @@ def add(commands: CommandLine) -> None:
     parser.add_argument(
         "--bounds",
         metavar="X,X,Y,Y,Z,Z",
-        help="vti, mpem: where, six lengths with their units, lowest and highest x, y and z (default: the region)",
+        help="vti, mpem: where, six lengths with their units, lowest and highest x, y and z (default: around the "
+        "region; mpem: all of it)",
     )
     parser.add_argument("--tolerance", metavar="REL", type=float, help="mpem: largest relative error (default: 0.01)")
     parser.add_argument("--points", metavar="P.csv", help="vtu, samples: where (default: 2560 points of the region)")
@@ -78,44 +90,21 @@ def run(options: Namespace) -> int:
     target = TARGETS[options.to]
     path = output_file(options.output, [target.ending])
     _check_options(options, target)
-    if _is_system(options.model):
-        return _export_system(options, path)
-    from magfem.fitting import load_model
+    if target.of_coils and _means_a_system(options.model):
+        source, name, unit = _system(options)
+    else:
+        from magfem.fitting import load_model
 
-    model = load_model(options.model)
-    field = _driven(model, options.current)
-    more = target.write(field, path, options)
-    if field.unit == "T/A" and not options.quiet:
+        model = load_model(options.model)
+        source = _driven(model, options.current)
+        name, unit = model.name, source.unit
+    more = target.write(source, path, options)
+    if unit == "T/A" and not target.of_coils and not options.quiet:
         print("the field is that of 1 A, in T/A; --current gives it in T", file=sys.stderr)
-    data = {"output": str(path), "to": options.to, "name": model.name, "unit": field.unit, **more}
+    remark = f" ({more.pop('remark')})" if "remark" in more else ""
+    data = {"output": str(path), "to": options.to, "name": name, "unit": unit, **more}
     files = [str(path), *more.get("beside", [])]
-    show_result(options, f"{model.name}, in {field.unit}, for {options.to}: {', '.join(files)}", data)
-    return 0
-
-
-def _is_system(name: str) -> bool:
-    """Whether a path is that of a coil system rather than of a model."""
-    from magfem.actuation.system_file import is_system_file
-
-    path = Path(name)
-    return path.suffix in (".toml", ".yaml", ".yml") or (path.suffix == ".json" and is_system_file(path))
-
-
-def _export_system(options: Namespace, path: Path) -> int:
-    """All coils of a system, and its background."""
-    if options.to != "mpem":
-        raise InputError(
-            f"a coil system is exported to mpem; for {options.to} export the models of its coils, got "
-            f"{quoted(options.model)}"
-        )
-    if options.current is not None:
-        raise InputError("--current is for the model of one coil: a system stays per ampere")
-    from magfem.actuation import load_system
-
-    system = load_system(options.model)
-    more = _mpem(system, path, options)
-    data = {"output": str(path), "to": options.to, "name": system.name, "unit": "T/A", **more}
-    show_result(options, f"{system.name}, {len(system.coils)} coils in T/A, for {options.to}: {path}", data)
+    show_result(options, f"{name}, in {unit}, for {options.to}: {', '.join(files)}{remark}", data)
     return 0
 
 
@@ -125,6 +114,27 @@ def _check_options(options: Namespace, target: Target) -> None:
         if getattr(options, name) not in (None, False):
             users = " and ".join(other for other, one in TARGETS.items() if name in one.options)
             raise InputError(f"--{name} is for {users}, not for {options.to}")
+
+
+def _means_a_system(text: str) -> bool:
+    """Whether MODEL is a coil system: a system card, a system or MPEM file, or a name that no model has."""
+    from magfem.actuation.load import READERS, SECTION
+    from magfem.actuation.system_file import is_system_file
+    from magfem.geometry.catalogue import names
+
+    if text.endswith(".json"):  # models are, too
+        return is_system_file(Path(text))
+    return Path(text).suffix in READERS or text in set(names(SECTION, ".toml")) - set(names("fits", ".json"))
+
+
+def _system(options: Namespace) -> tuple[Any, str, str]:
+    """The system, its name and unit."""
+    from magfem.actuation import load_system
+
+    if options.current is not None:
+        raise InputError("--current is for one coil's model, and this is a coil system")
+    system = load_system(options.model)
+    return system, system.name, "T/A"
 
 
 def _driven(field: Field, current: float | None) -> Field:
@@ -165,19 +175,6 @@ def _c(field: Field, path: Path, options: Namespace) -> dict[str, Any]:
     return {"function": f"{name}_field"}
 
 
-def _mpem(field: Field | CoilSystem, path: Path, options: Namespace) -> dict[str, Any]:
-    from magfem.actuation.mpem_export import TOLERANCE, write_mpem
-    from magfem.fields.workspace_region import Box
-
-    workspace = None
-    if options.bounds is not None:
-        low, high = _bounds(options.bounds)
-        workspace = Box((low[0], low[1], low[2]), (high[0], high[1], high[2]))
-    tolerance = TOLERANCE if options.tolerance is None else options.tolerance
-    done = write_mpem(field, path, workspace, tolerance)
-    return {"exact": done.exact, "residual": {"max": done.maximum, "rms": done.rms}, "sources": done.sources}
-
-
 def _vti(field: Field, path: Path, options: Namespace) -> dict[str, Any]:
     from magfem.exchange import write_grid
     from magfem.exchange.vtk_grid import LONGEST
@@ -195,13 +192,34 @@ def _vtu(field: Field, path: Path, options: Namespace) -> dict[str, Any]:
 
 def _samples(field: Field, path: Path, options: Namespace) -> dict[str, Any]:
     from magfem.cli.points import field_text
-    from magfem.exchange.vtk_grid import region_points
+    from magfem.exchange.region_parts import region_points
     from magfem.files import write_text
 
     given = _points(options)
-    points = region_points(field) if given is None else given
+    points = region_points(field.region) if given is None else given
     write_text(path, field_text(points, *field.jet(points, 1 if options.gradient else 0)))
     return {"points": len(points), "gradient": options.gradient}
+
+
+def _mpem(source: Field | CoilSystem, path: Path, options: Namespace) -> dict[str, Any]:
+    from magfem.actuation.mpem_export import TOLERANCE, write_mpem
+    from magfem.fields.workspace_region import Box
+
+    tolerance = TOLERANCE if options.tolerance is None else options.tolerance
+    if not 0 < tolerance < math.inf:
+        raise InputError(f"--tolerance must be a positive number, got {tolerance}")
+    workspace = None if options.bounds is None else Box(*_bounds(options.bounds))
+    done = write_mpem(source, path, workspace, tolerance)
+    count = f"{done.sources} source{'s' * (done.sources != 1)}"
+    residual = f"fitted, relative error of B at most {done.maximum:.1e}, {done.rms:.1e} RMS"
+    return {
+        "remark": f"{count}, {'exact' if done.exact else residual}",
+        "sources": done.sources,
+        "exact": done.exact,
+        "residual": {"max": done.maximum, "rms": done.rms},
+        "coils": {label: {"max": worst, "rms": rms} for label, (worst, rms) in done.residuals.items()},
+        "region": done.region,
+    }
 
 
 def _points(options: Namespace) -> Points | None:
@@ -210,20 +228,20 @@ def _points(options: Namespace) -> Points | None:
     return None if options.points is None else read_points(Path(options.points))
 
 
-def _bounds(text: str) -> list[list[float]]:
+def _bounds(text: str) -> tuple[Corner, Corner]:
     """Lowest and highest corner, m."""
     parts = text.split(",")
     if len(parts) != 6:
         raise InputError(f"--bounds is six lengths with commas between them, x, x, y, y, z, z, got {quoted(text)}")
-    lengths = [quantity(part, "length") for part in parts]
-    return [lengths[0::2], lengths[1::2]]
+    x, X, y, Y, z, Z = (quantity(part, "length") for part in parts)
+    return (x, y, z), (X, Y, Z)
 
 
 TARGETS: dict[str, Target] = {
     "magpylib": Target(_magpylib, ".py"),
     "mat": Target(_mat, ".mat"),
     "c": Target(_c, ".h", frozenset({"name"})),
-    "mpem": Target(_mpem, ".yaml", frozenset({"bounds", "tolerance"})),
+    "mpem": Target(_mpem, ".yaml", frozenset({"bounds", "tolerance"}), of_coils=True),
     "vti": Target(_vti, ".vti", frozenset({"grid", "bounds"})),
     "vtu": Target(_vtu, ".vtu", frozenset({"points"})),
     "samples": Target(_samples, ".csv", frozenset({"points", "gradient"})),

@@ -6,10 +6,10 @@ stands where the model's own name comes.
 
 from __future__ import annotations
 
+import math
 import re
 from functools import cache
 from importlib.resources import files
-from math import pi
 from typing import Any
 
 import numpy as np
@@ -18,12 +18,14 @@ from jinja2 import Environment, FunctionLoader, StrictUndefined
 from magfem.constants import MU_0
 from magfem.errors import InputError
 from magfem.exchange.about import facts, terms_of
-from magfem.exchange.shells import PlacedShell, placed_shells
+from magfem.exchange.region_parts import RegionPart, region_parts
 from magfem.fields.field import Field
-from magfem.fields.hull import BoxHull, CylinderHull, SphereHull
+from magfem.fields.hull import BoxHull, CylinderHull, Hull, SphereHull
+from magfem.fields.region import Region, Shell
 from magfem.fields.solid_harmonics import interior_scale, schmidt_scale
 from magfem.fields.term_kinds import CHARGE_DISC, HARMONIC, INTERIOR, LOOP, NAMES, OBLATE, PATH
 from magfem.fields.terms import Terms
+from magfem.fields.workspace_region import Ball, Box
 from magfem.units import quoted
 
 _PIECES = {
@@ -81,20 +83,19 @@ def _context(field: Field) -> dict[str, Any]:
     tabled = np.isin(terms.kind[terms.owner], (HARMONIC, INTERIOR))
     rows = int(terms.degree[tabled].max()) + 3 if tabled.any() else 0
     columns = min(rows, int(terms.order[tabled].max()) + 3) if tabled.any() else 0
-    shells = placed_shells(field.region)
-    told = shells is not None and all(isinstance(one.shell.hull, tuple(_HULLS)) for one in shells)
+    parts = region_parts(field.region)
     return {
         "facts": {key: _comment(text) for key, text in facts(field).items()},
         "per_ampere": ", for 1 A" if field.unit == "T/A" else "",
         "kinds": [NAMES[kind] for kind in kinds],
         "pieces": list(dict.fromkeys(piece for kind in kinds for piece in _PIECES[kind])),
-        "mu_0_over_4pi": repr(MU_0 / (4.0 * pi)),
+        "mu_0_over_4pi": repr(MU_0 / (4.0 * math.pi)),
         "sources": [_one_source(terms, k, ranges) for k in range(terms.kind.size)],
         "harmonics": harmonics,
         "rows": rows,
         "columns": columns,
         "nodes": [_numbers(node) for node in terms.nodes],
-        "shells": [_shell(one) for one in shells] if told and shells is not None else None,
+        "parts": [_part(part) for part in parts] if all(_is_told(part.region) for part in parts) else None,
     }
 
 
@@ -135,28 +136,63 @@ def _one_source(terms: Terms, k: int, ranges: list[tuple[int, int]]) -> dict[str
 _HULLS = {CylinderHull: "cylinder", BoxHull: "box", SphereHull: "sphere"}
 """The hulls whose distance the header can tell."""
 
+_SLACK = 1e-12  # of the size, as `contains` of every region has it: points made to lie on a limit are inside
 
-def _shell(placed: PlacedShell) -> dict[str, Any]:
-    shell, hull = placed.shell, placed.shell.hull
-    if isinstance(hull, BoxHull):
-        size = hull.size
-    elif isinstance(hull, CylinderHull):
-        size = (hull.diameter, hull.diameter, hull.length)
-    else:
-        assert isinstance(hull, SphereHull)
-        size = (hull.diameter,) * 3
-    rotation, origin = placed.pose.rotation.as_matrix(), placed.pose.translation
+
+def _is_told(region: Region) -> bool:
+    """Whether the header can say who is in the region."""
+    return isinstance(region, Ball | Box) or (isinstance(region, Shell) and isinstance(region.hull, tuple(_HULLS)))
+
+
+def _part(part: RegionPart) -> dict[str, Any]:
+    """A part of the region: where its own frame is, and its limits."""
+    rotation, origin = part.pose.rotation.as_matrix(), part.pose.translation
     moved = np.any(rotation != np.eye(3)) or np.any(origin != 0)
-    slack = 1e-12 * shell.extent  # as `Shell.contains` has it
     return {
-        "words": _comment(f"{shell.describe()}: {hull.describe()}"),
-        "hull": _HULLS[type(hull)],
-        "half": [repr(length / 2) for length in size],
-        "nearest": repr(shell.clearance - slack),
-        "farthest": repr(shell.extent + slack),
+        "words": _comment(part.region.describe()),
         "origin": _numbers(origin),
         "frame": _numbers(rotation.ravel()) if moved else None,
+        **_limits(part.region),
     }
+
+
+def _limits(region: Region) -> dict[str, Any]:
+    """What the template compares with, slack included. Intervals without an end have None there."""
+    if isinstance(region, Ball):
+        return {"kind": "ball", "centre": _numbers(region.centre), "farthest": repr(region.radius * (1 + _SLACK))}
+    if isinstance(region, Box):
+        slack = _SLACK * max(map(abs, (*region.low, *region.high)))
+        intervals = [_interval((low, high), slack) for low, high in zip(region.low, region.high, strict=True)]
+        return {"kind": "box", "intervals": list(zip("xyz", intervals, strict=True))}
+    assert isinstance(region, Shell)
+    slack = _SLACK * region.extent
+    window = {"z": _interval(region.z, slack), "rho": _interval(region.rho, slack)}
+    if region.rho[0] <= 0:
+        window["rho"] = (None, window["rho"][1])
+    return {
+        "kind": "shell",
+        "hull": _HULLS[type(region.hull)],
+        "hull_words": _comment(region.hull.describe()),
+        "half": [repr(length / 2) for length in _size(region.hull)],
+        "nearest": repr(region.clearance - slack),
+        "farthest": repr(region.extent + slack),
+        "window": window,
+    }
+
+
+def _interval(pair: tuple[float, float], slack: float) -> tuple[str | None, str | None]:
+    low, high = pair
+    return repr(low - slack) if math.isfinite(low) else None, repr(high + slack) if math.isfinite(high) else None
+
+
+def _size(hull: Hull) -> tuple[float, float, float]:
+    """Lengths along x, y, z, m."""
+    if isinstance(hull, BoxHull):
+        return hull.size
+    if isinstance(hull, CylinderHull):
+        return hull.diameter, hull.diameter, hull.length
+    assert isinstance(hull, SphereHull)
+    return hull.diameter, hull.diameter, hull.diameter
 
 
 def _numbers(array: Any) -> list[str]:

@@ -12,13 +12,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import RigidTransform
 
 from magfem.errors import InputError
 from magfem.exchange.about import ascii_text, facts
-from magfem.exchange.shells import bounding_box
+from magfem.exchange.region_parts import bounding_box, region_points
 from magfem.fields.field import Field, as_points
-from magfem.fields.region import PlacedRegion, Shell
 from magfem.files import write_bytes
 from magfem.typing import ArrayLike, Points
 
@@ -26,7 +24,6 @@ LONGEST = 61
 """Points along a grid's longest edge, unless told otherwise."""
 
 _MOST = 50_000_000  # points of a grid: 5 GB
-_SEED = 1
 
 
 def write_grid(field: Field, path: str | Path, bounds: ArrayLike | None = None, longest: int = LONGEST) -> Points:
@@ -55,29 +52,17 @@ def write_grid(field: Field, path: str | Path, bounds: ArrayLike | None = None, 
 def write_points(field: Field, path: str | Path, points: ArrayLike | None = None) -> Points:
     """Write the field at points (n, 3) m, as `write_grid` has it, to `path` (.vtu); the points.
 
-    points: by default 2560 of the field's region, closer together where fields are steeper. Raises InputError for
-    points that are none, or a region that gives none.
+    points: by default 2560 of the field's region, in a shell closer together where fields are steeper. Raises
+    InputError for points that are none, or a region that gives none.
     """
     import pyvista
 
-    chosen = region_points(field) if points is None else as_points(points).reshape(-1, 3)
+    chosen = region_points(field.region) if points is None else as_points(points).reshape(-1, 3)
     count = len(chosen)
     cells = np.column_stack([np.ones(count, dtype=np.int64), np.arange(count)]).ravel()
     cloud = pyvista.UnstructuredGrid(cells, np.full(count, pyvista.CellType.VERTEX), chosen)
     _write(field, chosen, cloud, Path(path), ".vtu")
     return chosen
-
-
-def region_points(field: Field) -> Points:
-    """Random points (2560, 3) m of the field's region, the same every time."""
-    region, pose = field.region, RigidTransform.identity()
-    while isinstance(region, PlacedRegion):
-        pose = pose * region.pose
-        region = region.region
-    if not isinstance(region, Shell):
-        raise InputError(f"the field's region ({field.region.describe()}) offers no points of its own: say which")
-    points: Points = pose.apply(region.layers(np.random.default_rng(_SEED)).reshape(-1, 3))
-    return points
 
 
 def grid_shape(box: ArrayLike, longest: int) -> tuple[int, int, int]:

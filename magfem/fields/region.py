@@ -68,6 +68,13 @@ class Shell:
         array = np.asarray(points, dtype=float)
         distance = self.hull.distance(array)
         slack = 1e-12 * self.extent  # points made to lie on the limit are inside
+        if array.ndim == 1:  # one point, faster without arrays
+            x, y, z = array.tolist()
+            return np.asarray(
+                self.clearance - slack <= float(distance) <= self.extent + slack
+                and self.z[0] - slack <= z <= self.z[1] + slack
+                and self.rho[0] - slack <= math.hypot(x, y) <= self.rho[1] + slack
+            )
         inside: Booleans = (distance >= self.clearance - slack) & (distance <= self.extent + slack)
         if self.windowed:
             z, rho = array[..., 2], np.hypot(array[..., 0], array[..., 1])

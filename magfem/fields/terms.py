@@ -26,7 +26,9 @@ from magfem.typing import ArrayLike, Floats, Integers, Jet, Points
 HIGHEST_DEGREE = 80
 """Of harmonics: factorials of twice this, and of the derivatives, still fit a float."""
 
-_PARALLEL_FROM = 4096  # points; below, starting threads costs more than it saves
+PARALLEL_FROM = 4096
+"""Points for each thread; below, starting threads costs more than it saves."""
+
 _NEUTRAL = 1e-9  # of the discs' charges taken one by one: their sum must be below
 _NONE: tuple[Floats, Floats] = (np.empty((0, 3, 3)), np.empty((0, 3, 3, 3)))
 
@@ -175,10 +177,10 @@ class Terms:
         def run(chunk: slice) -> None:
             evaluate(points[chunk], *packed, order, B[chunk], gradient[chunk], hessian[chunk])
 
-        if count < 2 * _PARALLEL_FROM:
+        if count < 2 * PARALLEL_FROM:
             evaluate(points, *packed, order, B, gradient, hessian)
         else:
-            in_chunks(run, count, _PARALLEL_FROM, BLOCK)
+            in_chunks(run, count, PARALLEL_FROM, BLOCK)
         return (B, gradient, hessian)[: order + 1]
 
 

@@ -98,7 +98,46 @@ def evaluate(
                     order,
                     out,
                 )
-            if flush and not common:
+            if (flush or k == layout.shape[0] - 1) and not common:
                 add_rotated(f, turned, count, order, total)
                 fresh = True
         unpack(total, count, order, B[begin:], gradient[begin:], hessian[begin:])
+
+
+@kernel
+def evaluate_each(
+    points: Points,
+    begin: int,
+    end: int,
+    group: Integers,
+    layout: Integers,
+    numbers: Floats,
+    reals: Floats,
+    complexes: Complexes,
+    indices: Integers,
+    nodes: Floats,
+    order: int,
+    B: Floats,
+    gradient: Floats,
+    hessian: Floats,
+) -> None:
+    """As `evaluate`, but the jets of every group of sources on its own, at the points from `begin` to `end`.
+
+    B: (g, n, 3), gradient: (g, n, 3, 3), hessian: (g, n, 3, 3, 3), or of one group and no points beyond `order`.
+    group: (g + 1,), group i has the rows group[i]:group[i + 1] of `layout`.
+    """
+    for i in range(group.size - 1):
+        a, b = group[i], group[i + 1]
+        evaluate(
+            points[begin:end],
+            layout[a:b],
+            numbers[a:b],
+            reals,
+            complexes,
+            indices,
+            nodes,
+            order,
+            B[i][begin:end],
+            gradient[i if order > 0 else 0][begin:end],
+            hessian[i if order > 1 else 0][begin:end],
+        )

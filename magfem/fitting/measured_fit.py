@@ -33,6 +33,7 @@ _SAFETY = 1.5  # on the largest held-out error: other points may hit a little ha
 _REGIONS = 8  # that samples are cut into where regions are held out
 _MANY = 200  # samples, from which regions are held out rather than single ones
 _FLOOR = 0.01  # of the largest field: smaller ones do not count relative to themselves
+_AT_BOUND = 1e-4  # of the bounds' distance: nearer to one of them a free parameter has reached it
 _WORSE = 2  # candidates in a row that predict worse than the best end the search
 
 
@@ -81,6 +82,8 @@ def fit_samples(samples: Samples, recipe: Recipe | None = None) -> FieldModel:
             if linear + len(measurement.free) >= rows or (recipe.most_parameters or rows) < linear:
                 continue
             solved = solve_measurement(measurement)
+            if not np.isfinite(solved.solved.condition):  # the samples say nothing of some of its parameters
+                continue
             own.append(Tried(solved, _predicted(solved, heldout)))
             best = min(one.score for one in own)
             if len(own) > _WORSE and all(one.score > best for one in own[-_WORSE:]):
@@ -88,7 +91,8 @@ def fit_samples(samples: Samples, recipe: Recipe | None = None) -> FieldModel:
         tried += own
     if not tried:
         raise ConvergenceError(
-            f"{rows} measured components are too few for any model of this family [{samples.source}]"
+            f"{rows} measured components are too few, or in too few places, for any model of this family; a symmetry "
+            f"leaves fewer parameters [{samples.source}]"
         )
     chosen = _smallest_of_the_best(tried)
     _say_what_was_left(tried, chosen)
@@ -214,7 +218,7 @@ def _model(samples: Samples, recipe: Recipe, tried: list[Tried], chosen: Tried, 
         log.warning("fit: the model's own error is larger than the noise: deviations of the field say too little")
     if fit.degenerate:
         log.warning(
-            "fit: %s cannot be told from the coefficients: no deviation is stated; fix them or the sources' geometry",
+            "fit: these data do not decide %s: no deviation is stated; fix what is known, or the sources' geometry",
             " and ".join(fit.degenerate),
         )
     worst = int(np.argmax(chosen.predicted * _scale_of_points(fit)))
@@ -235,7 +239,7 @@ def _model(samples: Samples, recipe: Recipe, tried: list[Tried], chosen: Tried, 
         },
         "candidates": [_headline(one) for one in tried],
         "comparison": [],
-        "measurement": _findings(fit, recipe),
+        "measurement": _findings(fit, recipe, uncertainty),
         "uncertainty": uncertainty,
     }
     log.info(
@@ -319,15 +323,21 @@ def _headline(one: Tried) -> dict[str, Any]:
     }
 
 
-def _findings(fit: MeasuredFit, recipe: Recipe) -> dict[str, Any]:
-    """Free parameters with deviations, the background, outliers."""
+def _findings(fit: MeasuredFit, recipe: Recipe, uncertainty: dict[str, Any]) -> dict[str, Any]:
+    """Free parameters with deviations, the background, outliers.
+
+    Where the model's own error dominates, deviations are those of a noise that is as large as the residual.
+    """
     linear = len(fit.solved.parameters)
-    deviation = np.sqrt(np.diag(fit.covariance))
+    inflated = uncertainty["standardised_residual"] if uncertainty["bias_dominates"] else 1.0
+    deviation = inflated * np.sqrt(np.diag(fit.covariance))
+    low, high = fit.measurement.bounds
+    at_bound = np.minimum(fit.theta - low, high - fit.theta) < _AT_BOUND * (high - low)
     free = {
         name: {
             "value": float(fit.theta[k]),
             "deviation": None if name in fit.degenerate else float(deviation[linear + k]),
-            "at_bound": bool(np.min(np.abs(fit.theta[k] - np.array([b[k] for b in fit.measurement.bounds]))) < 1e-9),
+            "at_bound": bool(at_bound[k]),
         }
         for k, name in enumerate(fit.measurement.free)
     }

@@ -13,6 +13,7 @@ from scipy.optimize import least_squares
 from magfem.fitting.alignment import Alignment
 from magfem.fitting.candidate import Candidate, Displaceable
 from magfem.fitting.least_squares import LeastSquares, Ridge, solve_least_squares
+from magfem.fitting.truncation import next_degree
 from magfem.samples import Samples
 from magfem.typing import Booleans, Floats, Integers
 
@@ -21,6 +22,7 @@ Loss: TypeAlias = Literal["squares", "huber"]
 
 _HUBER = 1.345  # standard deviations: 95 % as sharp as plain squares where the noise is normal
 _STEP = 1e-6  # of the bounds' distance, for the derivatives by the free parameters
+_REFINED = 3  # of the starts
 CONDITION = 1e7
 
 
@@ -89,14 +91,31 @@ class Measurement:
             return self.member.make(theta[: len(self.member.names)])
         return self.member
 
+    def seen(self, candidate: Candidate, theta: Floats) -> Floats:
+        """What each parameter of a candidate makes the sensor read: (r, p), scaled."""
+        own = theta[len(theta) - len(self.alignment.names) :]
+        columns = self.alignment.columns(candidate, self.samples.points, own)
+        scaled: Floats = (columns / self.scale)[:, self.measured].T
+        return scaled
+
     def matrix(self, theta: Floats) -> Floats:
         """Columns of all linear parameters, background last: (r, p), scaled."""
-        own = theta[len(theta) - len(self.alignment.names) :]
-        columns = self.alignment.columns(self.candidate(theta), self.samples.points, own)
+        columns = self.seen(self.candidate(theta), theta)
         if self.background:
             background = np.broadcast_to(np.eye(3)[:, None], (3, *self.samples.points.shape))
-            columns = np.concatenate([columns, background])
-        return (columns / self.scale)[:, self.measured].T
+            columns = np.hstack([columns, (background / self.scale)[:, self.measured].T])
+        return columns
+
+    def slopes(self, theta: Floats, parameters: Floats) -> Floats:
+        """Derivatives (r, q) of the scaled rows by the nonlinear parameters, the linear ones (p,) held."""
+        low, high = self.bounds
+        columns = []
+        for k, step in enumerate(_STEP * (high - low)):
+            up, down = theta.copy(), theta.copy()
+            up[k], down[k] = min(theta[k] + step, high[k]), max(theta[k] - step, low[k])
+            values = (self.seen(_held(self.candidate(places), parameters), places) for places in (up, down))
+            columns.append(np.subtract(*values)[:, 0] / (up[k] - down[k]))
+        return np.column_stack(columns)
 
     @cached_property
     def target(self) -> Floats:
@@ -115,13 +134,19 @@ class Measurement:
         return solve_least_squares(matrix, target, self.ridge, self.variance, CONDITION)
 
 
+def _held(candidate: Candidate, parameters: Floats) -> Candidate:
+    """The candidate as one source: its parameters, the first of (p,), in fixed ratio."""
+    terms = candidate.with_parameters(parameters[: candidate.parameters])
+    return Candidate(candidate.family, candidate.label, terms, np.zeros_like(candidate.parameter))
+
+
 @dataclass(frozen=True)
 class MeasuredFit:
     """A measurement solved.
 
     theta: (q,) nonlinear parameters.  solved: the linear ones, background last.  weight: (r,) of the rows, below one
-    for outliers.  joint: (r, p + q) derivatives of all rows by all parameters.  covariance: (p + q, p + q).
-    degenerate: names of nonlinear parameters that the coefficients can stand in for.
+    for outliers.  covariance: (p + q, p + q), the degenerate parameters held: NaN in their rows and columns.
+    degenerate: names of nonlinear parameters that the data do not decide (`_degenerate`).
     left_out: (r,) residual of every row had its sample not been fitted, in units of its scale.
     """
 
@@ -144,8 +169,9 @@ class MeasuredFit:
         return self.solved.residual / self.weight
 
 
-_ALIKE = 1e-3
-"""Share of a nonlinear parameter's effect that the linear ones must leave unexplained for it to count as determined."""
+_ALIKE = 5e-3  # of a nonlinear parameter's effect: where the linear ones leave less, a model's own error decides
+_DECIDED = 1 / 3  # of the bounds' half distance: a deviation above that is made by the bounds and not by the data
+_ROUNDING = 1e-6  # of the data: no noise is smaller, for the slopes are no better
 
 
 def solve_measurement(measurement: Measurement) -> MeasuredFit:
@@ -165,19 +191,36 @@ def solve_measurement(measurement: Measurement) -> MeasuredFit:
 
 
 def _project(measurement: Measurement, weight: Floats, starts: Floats) -> Floats:
-    """The nonlinear parameters (q,) that leave the least, by variable projection from every start."""
+    """The nonlinear parameters (q,) that leave the least, by variable projection from the most promising starts."""
     if not measurement.free:
         return np.empty(0)
     low, high = measurement.bounds
     # While places are sought the ridge must not move with them.
     plain = replace(measurement, ridge="none")
 
-    def residual(theta: Floats) -> Floats:
-        return plain.solve(theta, weight).residual
+    last: dict[bytes, LeastSquares] = {}
 
+    def solved(theta: Floats) -> LeastSquares:
+        key = theta.tobytes()
+        if key not in last:
+            last.clear()
+            last[key] = plain.solve(theta, weight)
+        return last[key]
+
+    def residual(theta: Floats) -> Floats:
+        return solved(theta).residual
+
+    def jacobian(theta: Floats) -> Floats:
+        """Kaufman's: what the columns cannot follow of the slopes (BIT 15, 49 (1975))."""
+        one = solved(theta)
+        slopes = measurement.slopes(theta, one.parameters) * weight[:, None]
+        followed: Floats = one.basis @ (one.basis.T @ slopes)
+        return followed - slopes
+
+    promising = sorted(starts, key=lambda start: float(np.sum(residual(start) ** 2)))[:_REFINED]
     found = [
-        least_squares(residual, start, bounds=(low, high), x_scale=high - low, xtol=1e-12, ftol=1e-12, gtol=1e-12)
-        for start in starts
+        least_squares(residual, start, jacobian, (low, high), x_scale=high - low, xtol=1e-12, ftol=1e-12, gtol=1e-12)
+        for start in promising
     ]
     best: Floats = min(found, key=lambda one: float(one.cost)).x
     return best
@@ -193,46 +236,68 @@ def _linear(measurement: Measurement, solved: LeastSquares, weight: Floats) -> M
 def _judged(measurement: Measurement, theta: Floats, solved: LeastSquares, weight: Floats) -> MeasuredFit:
     """Covariance of all parameters together, what cannot be told apart, and leave-one-out residuals."""
     matrix = measurement.matrix(theta) * weight[:, None]
-    q = theta.size
-    if q:
-        low, high = measurement.bounds
-        slopes = []
-        for k, step in enumerate(_STEP * (high - low)):
-            up, down = theta.copy(), theta.copy()
-            up[k], down[k] = min(theta[k] + step, high[k]), max(theta[k] - step, low[k])
-            change = (measurement.matrix(up) - measurement.matrix(down)) @ solved.parameters / (up[k] - down[k])
-            slopes.append(change * weight)
-        matrix = np.column_stack([matrix, *slopes])
-    length = np.linalg.norm(matrix, axis=0)
+    slopes = measurement.slopes(theta, solved.parameters) * weight[:, None]
+    told, parameters = np.flatnonzero(matrix.any(axis=0)), matrix.shape[1] + theta.size
+    joint = np.column_stack([matrix[:, told], slopes])
+    length = np.linalg.norm(joint, axis=0)
     length[length == 0] = 1.0
-    scaled = matrix / length
-    linear = scaled.shape[1] - q
-    basis, _ = linalg.qr(scaled[:, :linear], mode="economic")
-    degenerate: list[str] = []
-    kept = list(range(linear))
-    for k, name in enumerate(measurement.free):
-        own = scaled[:, linear + k]
-        left = own - basis @ (basis.T @ own)
-        if np.linalg.norm(left) < _ALIKE:
-            degenerate.append(name)
-            continue
-        kept.append(linear + k)
-        basis = np.column_stack([basis, left / np.linalg.norm(left)])
+    scaled = joint / length
+    free = ~_degenerate(measurement, theta, solved, weight, scaled, length)
+    kept = np.concatenate([np.ones(told.size, dtype=bool), free])
     # The ridge is the prior of the linear parameters, in the same units as in `solve_least_squares`.
-    prior = np.sqrt(solved.ridge) * np.eye(len(kept))[:linear]
+    prior = np.sqrt(solved.ridge) * np.eye(int(np.count_nonzero(kept)))[: told.size]
     _, s, vt = linalg.svd(np.vstack([scaled[:, kept], prior]), full_matrices=False)
     root = vt.T / np.maximum(s, np.finfo(float).tiny)
-    covariance = np.full((linear + q, linear + q), np.nan)
-    covariance[np.ix_(kept, kept)] = solved.variance * root @ root.T / np.outer(length[kept], length[kept])
+    covariance = np.full((parameters, parameters), np.nan)
+    known = np.concatenate([told, matrix.shape[1] + np.flatnonzero(free)])
+    covariance[np.ix_(known, known)] = solved.variance * root @ root.T / np.outer(length[kept], length[kept])
     return MeasuredFit(
         measurement=measurement,
         theta=theta,
         solved=solved,
         weight=weight,
         covariance=covariance,
-        degenerate=tuple(degenerate),
+        degenerate=tuple(name for name, decided in zip(measurement.free, free, strict=True) if not decided),
         left_out=_left_out(measurement, scaled[:, kept] @ root, solved.residual) / weight,
     )
+
+
+def _degenerate(
+    measurement: Measurement, theta: Floats, solved: LeastSquares, weight: Floats, scaled: Floats, length: Floats
+) -> Booleans:
+    """Which nonlinear parameters (q,) the data do not decide.
+
+    scaled: (r, p + q) derivatives by all parameters, over their lengths (p + q,).
+    One whose effect the linear parameters follow to half a per cent, for the centre of an expansion with one degree
+    more; and one that stays as uncertain as its bounds make it, the others being free within theirs.
+    """
+    q = theta.size
+    linear = scaled.shape[1] - q
+    low, high = measurement.bounds
+    followers = scaled[:, :linear]
+    above = next_degree(measurement.candidate(theta))
+    left = _unfollowed(followers, scaled[:, linear:])
+    if above is not None:
+        more = measurement.seen(above, theta) * weight[:, None]
+        more = more / np.linalg.norm(more, axis=0)
+        centre = [k for k, name in enumerate(measurement.free) if name.startswith("centre")]
+        left[centre] = _unfollowed(np.hstack([followers, more]), scaled[:, linear:][:, centre])
+    # The bounds as priors, of half their distance as the deviation, make room where the data leave it.
+    noise = max(np.sqrt(solved.variance), _ROUNDING * float(np.sqrt(np.mean(measurement.target**2))))
+    half = 0.5 * (high - low)
+    prior = np.concatenate([np.full(linear, np.sqrt(solved.ridge)), noise / (half * length[linear:])])
+    _, s, vt = linalg.svd(np.vstack([scaled, np.diag(prior)]), full_matrices=False)
+    root = vt.T / np.maximum(s, np.finfo(float).tiny)
+    deviation = noise * np.linalg.norm(root[linear:], axis=1) / length[linear:]
+    undecided: Booleans = (left < _ALIKE) | (deviation > _DECIDED * half)
+    return undecided
+
+
+def _unfollowed(columns: Floats, wanted: Floats) -> Floats:
+    """Length (k,) of what is left of `wanted` (r, k) when `columns` (r, p) follow as well as they can."""
+    basis, _ = linalg.qr(columns, mode="economic")
+    left: Floats = np.linalg.norm(wanted - basis @ (basis.T @ wanted), axis=0)
+    return left
 
 
 def _left_out(measurement: Measurement, root: Floats, residual: Floats) -> Floats:

@@ -10,7 +10,8 @@ from typing import Any
 
 from magfem.errors import InputError
 from magfem.fields.region import Shell
-from magfem.fitting.families import FAMILIES, SAMPLE_FAMILIES, family_of, members
+from magfem.fitting.alignment import alignment_of
+from magfem.fitting.families import FAMILIES, SAMPLE_FAMILIES, check_options, family_of, members
 from magfem.fitting.least_squares import Ridge
 from magfem.fitting.measurement import Loss, Weighting
 from magfem.fitting.objective import Objective
@@ -82,6 +83,10 @@ class Recipe:
                 raise InputError(f"{complaint}, got {getattr(self, key)!r}")
         if self.circuit is not None and self.geometry is not None:
             _check_circuit(self.geometry, self.circuit)
+        alignment_of(self.free, 1.0)
+        if self.options and self.family not in (SEARCH, DEVICE):
+            suiting = family_of(self.geometry) if self.geometry else "interior_harmonics"
+            check_options(self.family or suiting, self.options)
         if self.family in FAMILIES and self.geometry:
             region = self.region or self.geometry.region
             next(members(self.family, self.geometry, region, self.family_options(self.family)))

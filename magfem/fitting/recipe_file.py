@@ -10,7 +10,7 @@ from typing import Any
 
 from magfem.errors import InputError
 from magfem.fields.region import Shell
-from magfem.fitting.alignment import ANGLES, LENGTHS
+from magfem.fitting.alignment import ANGLES, LENGTHS, alignment_of
 from magfem.fitting.recipe import Recipe, SamplesFile, complaint_about
 from magfem.geometry import load_geometry
 from magfem.geometry.card import Table, read_table
@@ -84,7 +84,8 @@ def load_recipe(name_or_path: str | Path) -> Recipe:
     try:
         return Recipe(**values)
     except InputError as error:
-        key = next((key for key in ("terms", "family", "circuit") if key.rstrip("s") in str(error)), "")
+        words = {"option": "terms", "term": "terms", "family": "family", "circuit": "circuit"}
+        key = next((key for word, key in words.items() if word in str(error)), "")
         raise table.error(str(error), key if key in table else "") from None
 
 
@@ -112,8 +113,8 @@ def _region(table: Table, device: Shell) -> Shell:
         if key in table:
             limits[key] = _pair(table, key, "length", 'one or two lengths, such as ["1 mm", "6 mm"]')
     region = replace(device, **limits)
-    if not (region.clearance < region.extent and region.z[0] < region.z[1] and 0 <= region.rho[0] < region.rho[1]):
-        raise table.error("lower limits must be smaller than upper ones, and rho not negative")
+    if not (0 <= region.clearance < region.extent and region.z[0] < region.z[1] and 0 <= region.rho[0] < region.rho[1]):
+        raise table.error("lower limits must be smaller than upper ones, clearance and rho not negative")
     return region
 
 
@@ -124,6 +125,8 @@ def _samples(table: Table, recipe: Path) -> SamplesFile:
         part = table.table("columns")
         columns = {key: part.text(key) for key in part.values}
     sigma = table.quantity("sigma", "flux density") if "sigma" in table else None
+    if sigma is not None and sigma <= 0:
+        raise table.error("sigma must be positive", "sigma")
     return SamplesFile(recipe.parent / table.text("file"), columns, sigma)
 
 
@@ -135,12 +138,18 @@ def _free(table: Table) -> dict[str, tuple[float, float] | None]:
         if value is True:
             free[name] = None
         elif isinstance(value, list):
-            free[name] = _pair(table, name, dimension, "two values")
+            free[name] = _pair(table, name, dimension, "two values", fewest=2)
         elif isinstance(value, str) and dimension:
             size = table.quantity(name, dimension)
+            if size <= 0:
+                raise table.error(f"{name} must be positive: a bound either way", name)
             free[name] = (-size, size)
         else:
             raise table.error(f"{name} must be true, a bound either way, or two bounds, got {describe(value)}", name)
+        try:
+            alignment_of({name: free[name]}, 1.0)
+        except InputError as error:
+            raise table.error(str(error), name) from None
     return free
 
 
@@ -152,9 +161,9 @@ def _dimension(name: str) -> str:
     return "angle" if stem in ANGLES else ""
 
 
-def _pair(table: Table, key: str, dimension: str, expected: str) -> tuple[float, float]:
+def _pair(table: Table, key: str, dimension: str, expected: str, fewest: int = 1) -> tuple[float, float]:
     value = table.value(key)
-    if not isinstance(value, list) or len(value) not in (1, 2):
+    if not isinstance(value, list) or not fewest <= len(value) <= 2:
         raise table.error(f"{key} must be {expected}, got {describe(value)}", key)
     parts = [Table(table.origin, {key: part}, table.path) for part in value]
     low, *high = [part.quantity(key, dimension) if dimension else part.number(key) for part in parts]

@@ -41,10 +41,15 @@ class Scale:
 def scale_to(model: FieldModel, measurements: Sequence[Measurement]) -> Scale:
     """The factor that fits single components best, each weighted by its uncertainty, or by its size without one.
 
-    Raises InputError for none, or for components that the model says vanish; OutsideRegionError outside its region.
+    Raises InputError for none, for components that the model says vanish, and where nothing says how sure the factor
+    is: a single measurement or one of zero without an uncertainty; OutsideRegionError outside the model's region.
     """
     if not measurements:
         raise InputError("a scale needs one measurement or more")
+    if len(measurements) == 1 and measurements[0].uncertainty is None:
+        raise InputError("a scale from a single measurement needs its uncertainty")
+    if any(one.uncertainty is None and one.value == 0 for one in measurements):
+        raise InputError("a measurement of zero needs an uncertainty: it cannot be weighed by its size")
     value = np.array([one.value for one in measurements])
     predicted = np.array([float(model.B(one.position) @ one.direction) for one in measurements])
     if not np.all(np.abs(predicted) > 1e-9 * np.abs(predicted).max()):

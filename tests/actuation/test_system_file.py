@@ -167,8 +167,11 @@ def test_what_people_read(here, capsys):
         (["fit", "bench.csv", "--device", "loop_50"], '--device is for single devices, and "bench.csv" is of a coil'),
         (["fit", "bench.csv", "--resolution", "2"], "--resolution is for single devices"),
         (["fit", "bench.csv", "-o", "system.yaml"], "expected a file that ends in .json"),
-        (["export", "system.json", "--to", "c", "-o", "s.h"], "a coil system is exported to mpem"),
-        (["export", "system.json", "--to", "mpem", "-o", "s.yaml", "--current", "2"], "--current is for the model of"),
+        (["export", "system.json", "--to", "c", "-o", "s.h"], "this is not a field model"),
+        (
+            ["export", "system.json", "--to", "mpem", "-o", "s.yaml", "--current", "2"],
+            "--current is for one coil's model",
+        ),
     ],
 )
 def test_options_that_do_not_go_with_systems(system, here, capsys, words, complaint):

@@ -123,8 +123,6 @@ def test_field_at_a_current_is_the_field_per_ampere_times_it(
 @pytest.mark.parametrize(
     ("words", "fragment"),
     [
-        (f"fit {SPIRAL}", "models of coils are not fitted yet; the solution of magfem.solve is a field itself"),
-        ("fit recipe.toml", "models of coils are not fitted yet"),
         (f"solve {SPIRAL} --dimension 2", "can be solved in dimension 2: use 3"),
         (f"solve {SPIRAL} --conduction wire", "invalid choice: 'wire'"),
         (f"solve {SPIRAL} --resolution 9", "resolution must lie between 0.5 and 4 for coils, got 9"),

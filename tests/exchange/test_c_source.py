@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shutil
 import subprocess
 from pathlib import Path
@@ -9,14 +10,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 from exchange.exchanged_fields import FIELDS, KINDS, POSE, SHELL, TermsField, points_of, worst
+from scipy.spatial.transform import RigidTransform, Rotation
 
 import magfem
 from magfem.errors import InputError
 from magfem.exchange import c_header
 from magfem.exchange.c_source import as_c_name, c_name
-from magfem.fields import Evaluated, Everywhere, Shell
-from magfem.fields.hull import PolytopeHull, SphereHull
+from magfem.exchange.region_parts import region_points
+from magfem.fields import Evaluated, Everywhere, Field, Shell
+from magfem.fields.hull import BoxHull, PolytopeHull, SphereHull
+from magfem.fields.region import Region
 from magfem.fields.terms import uniform
+from magfem.fields.workspace_region import Ball, Box
 from magfem.typing import Points
 
 STRICT = ("-Wall", "-Wextra", "-pedantic", "-Werror")
@@ -101,22 +106,74 @@ def test_axis_and_disc_are_no_exceptions(compiler: str, tmp_path: Path) -> None:
     assert worst(slopes, gradient) < 1e-12
 
 
+FRONT = Shell(SHELL.hull, 0.5e-3, 6e-3, z=(1e-3, 6e-3), rho=(0.0, 5e-3))
+BESIDE = Shell(SHELL.hull, 0.0, 6e-3, z=(-2e-3, math.inf), rho=(3e-3, 6e-3))
+BALL = Ball((1e-3, -0.5e-3, 2e-3), 5e-3)
+BOX = Box((-3e-3, -4e-3, 0.5e-3), (5e-3, 2e-3, 6e-3))
+
+
+def placed_sum(*regions: Region) -> Field:
+    """Loops in regions, each a little beside the others."""
+    turn = Rotation.from_rotvec([0.2, -0.1, 0.3])
+    moves = [RigidTransform.from_components([k * 0.4e-3, 0.0, -k * 0.3e-3], turn**k) for k in range(len(regions))]
+    parts = [TermsField(KINDS["loops"], region).at(move) for region, move in zip(regions, moves, strict=True)]
+    return sum(parts[1:], parts[0])
+
+
 REGIONS = {
     "cylinder": TermsField(KINDS["loops"]),
     "sphere": TermsField(KINDS["loops"], Shell(SphereHull(3e-3), 0.0, 5e-3)),
     "placed": TermsField(KINDS["loops"]).at(POSE),
     "sum of a box and a cylinder": FIELDS["placed, scaled and summed"],
     "everywhere": TermsField(KINDS["loops"], Everywhere()),
+    "window in front": TermsField(KINDS["loops"], FRONT),
+    "window beside": TermsField(KINDS["loops"], BESIDE),
+    "window, placed": TermsField(KINDS["loops"], FRONT).at(POSE),
+    "window behind a box": TermsField(KINDS["loops"], Shell(BoxHull((3e-3, 2e-3, 1e-3)), 0.0, 6e-3, z=(-5e-3, -1e-3))),
+    "ball": TermsField(KINDS["loops"], BALL),
+    "ball, placed": TermsField(KINDS["loops"], BALL).at(POSE),
+    "box": TermsField(KINDS["loops"], BOX),
+    "box, placed": TermsField(KINDS["loops"], BOX).at(POSE),
+    "sum of a window, a ball and a box": placed_sum(FRONT, BALL, BOX),
 }
 
 
 @pytest.mark.parametrize("name", REGIONS)
 def test_inside_is_the_region(compiler: str, tmp_path: Path, name: str) -> None:
-    points = np.random.default_rng(4).uniform(-9e-3, 9e-3, (3000, 3))
+    points = np.random.default_rng(4).uniform(-9e-3, 9e-3, (6000, 3))
     inside, _, _ = run(compiled(compiler, tmp_path, c_header(REGIONS[name], "some")), points)
     expected = REGIONS[name].region.contains(points)
     assert np.all(inside == expected)
-    assert name == "everywhere" or 100 < expected.sum() < 2900
+    assert name == "everywhere" or 100 < expected.sum() < 5900
+
+
+@pytest.mark.parametrize("name", sorted(REGIONS.keys() - {"everywhere"}))
+def test_inside_ends_where_the_region_ends(compiler: str, tmp_path: Path, name: str) -> None:
+    """Points in pairs, one inside and one outside, not a picometre apart, on every face of the region."""
+    region = REGIONS[name].region
+    points = np.random.default_rng(5).uniform(-9e-3, 9e-3, (6000, 3))
+    is_in = region.contains(points)
+    count = min(is_in.sum(), (~is_in).sum())
+    within, beyond = points[is_in][:count], points[~is_in][:count]
+    for _ in range(36):  # halved from 3 cm
+        middle = (within + beyond) / 2
+        is_in = region.contains(middle)[:, None]
+        within, beyond = np.where(is_in, middle, within), np.where(is_in, beyond, middle)
+    assert count > 100 and np.abs(within - beyond).max() < 1e-12
+    program = compiled(compiler, tmp_path, c_header(REGIONS[name], "some"))
+    assert np.all(run(program, within)[0] == 1) and np.all(run(program, beyond)[0] == 0)
+
+
+@pytest.mark.parametrize("name", ["bigmag_iron", "solenoid_24x48x60_front"])
+def test_coils_of_the_catalogue_per_ampere(compiler: str, tmp_path: Path, name: str) -> None:
+    """In T/A, one in a ball and one in a window, both in front of the coil."""
+    coil = magfem.load_model(name)
+    points = region_points(coil.region, 500)
+    header = c_header(coil, "some")
+    inside, found, slopes = run(compiled(compiler, tmp_path, header), points)
+    assert np.all(inside == 1) and "T of a disc, for 1 A" in header and "the field of 1 A" in header
+    assert worst(found, coil.B(points)) < 1e-12 and worst(slopes, coil.gradient(points)) < 1e-12
+    assert np.all(run(tmp_path / "program", points * [1, 1, -1])[0] == 0)  # behind it
 
 
 def test_region_that_c_is_not_told_of(compiler: str, tmp_path: Path) -> None:

@@ -9,7 +9,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 from exchange.exchanged_fields import KINDS
+from references.mpem_formula import file_field
 from scipy.io import loadmat
 from vtkmodules.vtkIOXML import vtkXMLImageDataReader
 
@@ -18,10 +20,13 @@ from magfem.cli import main
 from magfem.cli.export import TARGETS
 from magfem.cli.program import command_line
 from magfem.exchange import c_header
-from magfem.fields import Field
+from magfem.exchange.region_parts import bounding_box, region_points
+from magfem.fields import Field, Shell
 from magfem.fields.terms_json import terms_to_list
+from magfem.fields.workspace_region import Box
+from magfem.typing import Floats
 
-RING = "ring_magnet_4x1.5x1"
+RING, ROTOR, SOLENOID = "ring_magnet_4x1.5x1", "rotor_1x3", "solenoid_24x48x60_front"
 
 
 @pytest.fixture
@@ -62,13 +67,13 @@ def source_of(path: str) -> Any:
 
 @pytest.mark.parametrize("to", TARGETS)
 def test_every_target_writes_its_file_and_says_so(here: Path, capsys: pytest.CaptureFixture[str], to: str) -> None:
-    file = f"ring{TARGETS[to].ending}"
-    data = output(capsys, RING, "--to", to, "-o", file)
+    file = f"rotor{TARGETS[to].ending}"
+    data = output(capsys, ROTOR, "--to", to, "-o", file)
     assert (data["output"], data["to"], data["unit"]) == (file, to, "T")
     assert {path.name for path in here.iterdir()} == {file, *data.get("beside", [])}
-    assert main(["export", RING, "--to", to, "-o", file]) == 0
+    assert main(["export", ROTOR, "--to", to, "-o", file]) == 0
     out, err = capsys.readouterr()
-    assert file in out and out.count("\n") == 1 and err == ""
+    assert file in out and out.count("\n") == 1 and "ampere" not in err
 
 
 def test_c_takes_its_name_from_the_file_or_the_option(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -131,6 +136,73 @@ def test_current_makes_a_coil_a_field_in_tesla(coil: Field, capsys: pytest.Captu
     assert np.array_equal(table[:, 3:], -0.5 * coil.B(table[:, :3]))
 
 
+def content(path: str) -> Any:
+    return yaml.safe_load(Path(path).read_text(encoding="utf-8"))
+
+
+def worst_of(found: Floats, true: Floats) -> float:
+    """Largest relative error of vectors (n, 3)."""
+    return float((np.linalg.norm(found - true, axis=1) / np.linalg.norm(true, axis=1)).max())
+
+
+def test_calibration_of_a_model_of_harmonics_is_exact(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """By the formula of the format, all over the model's region."""
+    data = output(capsys, "bigmag_iron", "--to", "mpem", "-o", "coil.yaml")
+    assert data["exact"] and data["residual"] == {"max": 0, "rms": 0} and data["unit"] == "T/A"
+    coil = magfem.load_model("bigmag_iron")
+    points = region_points(coil.region, 500)
+    assert worst_of(file_field(points, content("coil.yaml"), [3.0]), 3.0 * coil.B(points)) < 1e-12
+    assert main(["export", "bigmag_iron", "--to", "mpem", "-o", "coil.yaml", "-q"]) == 0
+    out, err = capsys.readouterr()
+    assert "exact" in out and err == ""  # the format is per ampere: nothing to explain
+
+
+def test_calibration_of_a_magnet_is_fitted_and_says_how_well(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """In a box of the user's; the residual is that of the file, by the formula."""
+    words = ("--to", "mpem", "-o", "ring.yaml", "--bounds", "-2 mm, 2 mm, -2 mm, 2 mm, 2.5 mm, 5 mm")
+    data = output(capsys, RING, *words, "--tolerance", "1e-3")
+    assert content("ring.yaml")["Workspace_Dimensions"] == [[-2e-3, 2e-3], [-2e-3, 2e-3], [2.5e-3, 5e-3]]
+    points = Box((-2e-3, -2e-3, 2.5e-3), (2e-3, 2e-3, 5e-3)).random_points(np.random.default_rng(8), 3000)
+    error = worst_of(file_field(points, content("ring.yaml"), []), magfem.load_model(RING).B(points))
+    assert 0 < data["residual"]["rms"] < data["residual"]["max"] < 1e-3 and not data["exact"]
+    assert data["residual"]["max"] / 10 < error < data["residual"]["max"]
+    assert main(["export", RING, *words, "-q"]) == 0
+    assert "relative error of B at most" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("name", ["bigmag", "octomag"])
+def test_calibration_of_a_whole_system(here: Path, capsys: pytest.CaptureFixture[str], name: str) -> None:
+    data = output(capsys, name, "--to", "mpem", "-o", "system.yaml")
+    system = magfem.load_system(name)
+    assert data["exact"] and data["name"] == system.name and len(data["coils"]) == len(system.coils)
+    currents = np.random.default_rng(9).uniform(-1, 1, len(system.coils))
+    points = region_points(system.region, 500)
+    assert output(capsys, "system.yaml", "--to", "mpem", "-o", "again.yaml")["name"] == system.name  # a path this time
+    for file in ("system.yaml", "again.yaml"):
+        assert worst_of(file_field(points, content(file), currents), system.B(points, currents)) < 1e-11
+
+
+def test_other_programs_take_windows_of_coils(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The solenoid's model is per ampere and in a window: its grid fills that, its samples lie in it, in T at 2 A."""
+    coil = magfem.load_model(SOLENOID)
+    data = output(capsys, SOLENOID, "--to", "vti", "-o", "coil.vti", "--grid", "9")
+    assert isinstance(coil.region, Shell) and coil.region.windowed
+    assert np.allclose(data["bounds"], bounding_box(coil.region)) and data["unit"] == "T/A"
+    output(capsys, SOLENOID, "--to", "samples", "-o", "coil.csv", "--current", "2")
+    table = np.loadtxt("coil.csv", delimiter=",", skiprows=1)
+    assert coil.region.contains(table[:, :3]).all()
+    assert np.allclose(table[:, 3:], 2 * coil.B(table[:, :3]), rtol=1e-14, atol=0)
+
+
+def test_calibration_of_a_coil_in_its_window(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Loops become multipoles all over the window, and the stated error is the file's, by the formula."""
+    data = output(capsys, SOLENOID, "--to", "mpem", "-o", "coil.yaml")
+    coil = magfem.load_model(SOLENOID)
+    points = region_points(coil.region)
+    error = worst_of(file_field(points, content("coil.yaml"), [1.0]), coil.B(points))
+    assert error < data["residual"]["max"] < 0.01 and list(data["coils"]) == ["Coil_0"] and not data["exact"]
+
+
 def test_mistakes_are_one_line_and_leave_nothing(coil: Field, capsys: pytest.CaptureFixture[str]) -> None:
     before = set(Path().iterdir())
     for words, expected in (
@@ -147,6 +219,14 @@ def test_mistakes_are_one_line_and_leave_nothing(coil: Field, capsys: pytest.Cap
         ((RING, "--to", "vti", "-o", "ring.vti", "--bounds", "1 mm,0 mm,0 mm,1 mm,0 mm,1 mm"), "lowest first"),
         ((RING, "--to", "vtu", "-o", "ring.vtu", "--points", "p.csv"), "no such file"),
         ((RING, "--to", "c", "-o", "ring.h", "--current", "1"), "per ampere"),
+        ((RING, "--to", "c", "-o", "ring.h", "--tolerance", "1"), "--tolerance is for mpem, not for c"),
+        ((RING, "--to", "mat", "-o", "ring.mat", "--bounds", "1 mm"), "--bounds is for mpem and vti, not for mat"),
+        ((RING, "--to", "mpem", "-o", "ring.yaml", "--tolerance", "0"), "positive number"),
+        ((RING, "--to", "mpem", "-o", "ring.yaml", "--bounds", "1 mm,0 mm,0 mm,1 mm,0 mm,1 mm"), "above the lower one"),
+        (("bigmag", "--to", "mpem", "-o", "bigmag.yaml", "--current", "1"), "this is a coil system"),
+        (("bigmag", "--to", "c", "-o", "bigmag.h"), "unknown field model"),
+        (("bigmaq", "--to", "mpem", "-o", "bigmag.yaml"), "unknown field model"),
+        (("nowhere.yaml", "--to", "mpem", "-o", "bigmag.yaml"), "no such file"),
         (("coil.json", "--to", "c", "-o", "ring.h", "--current", "nan"), "number of A"),
         (("coil.json", "--to", "magpylib", "-o", "coil.py"), "--current"),
         (("ring_magnet", "--to", "c", "-o", "ring.h"), "unknown field model"),

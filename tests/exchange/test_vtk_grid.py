@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from exchange.exchanged_fields import FIELDS, KINDS, POSE, SHELL, TermsField
+from scipy.spatial.transform import RigidTransform, Rotation
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkIOXML import vtkXMLImageDataReader, vtkXMLUnstructuredGridReader
 
 import magfem
 from magfem.errors import InputError
 from magfem.exchange import write_grid, write_points
-from magfem.exchange.shells import bounding_box
+from magfem.exchange.region_parts import bounding_box
 from magfem.exchange.vtk_grid import grid_shape
-from magfem.fields import Everywhere, Field
+from magfem.fields import Everywhere, Field, Shell
+from magfem.fields.region import Intersection, PlacedRegion, Region
+from magfem.fields.workspace_region import Ball, Box
 
+QUARTER = RigidTransform.from_rotation(Rotation.from_euler("z", 90, degrees=True))
 BOUNDS = np.array([[-3e-3, -2e-3, 1.5e-3], [3e-3, 4e-3, 4.5e-3]])
 
 
@@ -136,9 +141,66 @@ def test_box_of_a_placed_region_holds_it() -> None:
     assert len(points) > 100 and np.all(points >= smaller[0]) and np.all(points <= smaller[1])
 
 
+FRONT = Shell(SHELL.hull, 0.5e-3, 6e-3, z=(1e-3, 6e-3), rho=(0.0, 5e-3))
+BALL, BOX = Ball((1e-3, -0.5e-3, 2e-3), 5e-3), Box((-3e-3, -4e-3, 0.5e-3), (5e-3, 2e-3, 6e-3))
+
+
+@pytest.mark.parametrize(
+    ("region", "expected"),
+    [
+        (FRONT, [[-5e-3, -5e-3, 1e-3], [5e-3, 5e-3, 6e-3]]),
+        (Shell(SHELL.hull, 0.0, 6e-3, z=(-math.inf, 2e-3)), [[-8e-3, -8e-3, -6.5e-3], [8e-3, 8e-3, 2e-3]]),
+        (BALL, [[-4e-3, -5.5e-3, -3e-3], [6e-3, 4.5e-3, 7e-3]]),
+        (
+            PlacedRegion(BALL, RigidTransform.from_translation([1e-3, 2e-3, 3e-3])),
+            [[-3e-3, -3.5e-3, 0], [7e-3, 6.5e-3, 1e-2]],
+        ),
+        (PlacedRegion(BALL, QUARTER), [[-4.5e-3, -4e-3, -3e-3], [5.5e-3, 6e-3, 7e-3]]),
+        (BOX, [[-3e-3, -4e-3, 0.5e-3], [5e-3, 2e-3, 6e-3]]),
+        (PlacedRegion(BOX, QUARTER), [[-2e-3, -3e-3, 0.5e-3], [4e-3, 5e-3, 6e-3]]),
+        (Intersection((FRONT, BOX)), [[-3e-3, -4e-3, 1e-3], [5e-3, 2e-3, 6e-3]]),
+    ],
+)
+def test_boxes_of_windows_balls_and_boxes(region: Region, expected: list[list[float]]) -> None:
+    """By hand; a quarter turn about z takes (x, y) to (−y, x)."""
+    assert np.allclose(bounding_box(region), expected, rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    "region", [FRONT, BALL, BOX, Intersection((FRONT, PlacedRegion(BALL, POSE))), Intersection((BALL, BOX))]
+)
+@pytest.mark.parametrize("pose", [RigidTransform.identity(), POSE], ids=["as it is", "placed"])
+def test_points_of_every_region_lie_in_it(region: Region, pose: RigidTransform, tmp_path: Path) -> None:
+    """All of them, also after a way through the file, and within the bounding box; they come near to its ends."""
+    model = TermsField(KINDS["uniform"], PlacedRegion(region, pose))
+    write_points(model, tmp_path / "points.vtu")
+    data = read(tmp_path / "points.vtu")
+    points = vtk_to_numpy(data.GetPoints().GetData())
+    assert len(points) == len(np.unique(points, axis=0)) == 2560
+    assert np.all(array(data, "inside") == 1) and model.region.contains(points).all()
+    low, high = bounding_box(model.region)
+    assert np.all(points >= low - 1e-12) and np.all(points <= high + 1e-12)
+    if not isinstance(region, Intersection) and pose is not POSE:
+        assert np.all(points.min(axis=0) < low + 0.1 * (high - low))
+        assert np.all(points.max(axis=0) > high - 0.1 * (high - low))
+
+
+def test_a_grid_of_a_window_fills_it(tmp_path: Path) -> None:
+    """The share of the grid's points that are inside is the share of the volume: a cylinder's in its box, π/4."""
+    tube = Shell(SHELL.hull, 0.5e-3, 1.0, z=(2e-3, 4e-3), rho=(0.0, 3e-3))
+    points = write_grid(TermsField(KINDS["loops"], tube), tmp_path / "tube.vti", longest=101)
+    inside = array(read(tmp_path / "tube.vti"), "inside")
+    assert np.array_equal(inside, tube.contains(points))
+    assert inside.mean() == pytest.approx(np.pi / 4, rel=0.03)  # of cells; the outermost points count in full
+
+
 def test_shapes_follow_the_box() -> None:
     assert grid_shape([[0, 0, 0], [2, 1, 0.5]], 21) == (21, 11, 6)
     assert grid_shape([[0, 0, 0], [1, 1, 1e-9]], 3) == (3, 3, 2)
+
+
+NOWHERE = Shell(SHELL.hull, 0.5e-3, 6e-3, z=(8e-3, 9e-3))
+APART = Intersection((BALL, PlacedRegion(BOX, RigidTransform.from_translation([0.1, 0, 0]))))
 
 
 def test_what_cannot_be_sampled(ring: Field, tmp_path: Path) -> None:
@@ -152,6 +214,10 @@ def test_what_cannot_be_sampled(ring: Field, tmp_path: Path) -> None:
         (lambda: write_points(ring, tmp_path / "field.vtk"), "ends in .vtu"),
         (lambda: write_grid(TermsField(KINDS["loops"], Everywhere()), path), "bounds"),
         (lambda: write_points(TermsField(KINDS["loops"], Everywhere()), tmp_path / "f.vtu"), "say which"),
+        (lambda: write_grid(TermsField(KINDS["loops"], NOWHERE), path), "empty"),
+        (lambda: write_grid(TermsField(KINDS["loops"], APART), path), "empty"),
+        (lambda: write_points(TermsField(KINDS["loops"], NOWHERE), tmp_path / "f.vtu"), "hardly any point"),
+        (lambda: write_points(TermsField(KINDS["loops"], APART), tmp_path / "f.vtu"), "hardly any point"),
         (lambda: write_grid(ring, tmp_path / "nowhere" / "field.vti", longest=5), "cannot write"),
     ):
         with pytest.raises(InputError, match=words):

@@ -110,6 +110,23 @@ def test_shell_holds_what_lies_between_its_distances() -> None:
     assert SHELL.contains(np.zeros((0, 3))).shape == (0,)
 
 
+def test_points_one_by_one_are_in_the_shell_as_many_at_once_are() -> None:
+    """All round and in windows, on their limits and where there is no number."""
+    hull = CylinderHull(4e-3, 1e-3)
+    windows = [{}, {"z": (1e-3, 3e-3)}, {"rho": (1e-3, 4e-3)}, {"z": (-np.inf, 2e-3), "rho": (0.0, 4e-3)}]
+    grid = np.stack(np.meshgrid(*[np.linspace(-5e-3, 5e-3, 11)] * 3), axis=-1).reshape(-1, 3)
+    points = np.concatenate([grid, [[np.nan, 0, 3e-3], [0, 0, np.nan], [np.inf, 0, 0]]])
+    for window in windows:
+        region = Shell(hull, 0.5e-3, 3e-3, **window)
+        at_once = region.contains(points)
+        assert [bool(region.contains(point)) for point in points] == at_once.tolist()
+        assert 0 < at_once.sum() < len(grid) and not at_once[-3:].any()
+        low, high = region.z
+        height, rho = points[at_once, 2], np.hypot(points[at_once, 0], points[at_once, 1])
+        assert np.all((height >= low - 1e-12) & (height <= high + 1e-12))
+        assert np.all((rho >= region.rho[0] - 1e-12) & (rho <= region.rho[1] + 1e-12))
+
+
 def test_a_ring_bore_is_not_part_of_the_region() -> None:
     assert not SHELL.contains(np.zeros(3))
 

@@ -262,7 +262,7 @@ def test_device_may_be_a_card_beside_the_recipe(tmp_path, monkeypatch):
 def test_catalogue_recipes_are_read(name):
     found = load_recipe(name)
     assert found.geometry == magfem.load_geometry(name)
-    assert found.target_B <= 5e-4 and found.target_gradient <= 5e-3
+    assert found.targets["B"] <= 5e-4 and found.targets["gradient"] <= 5e-3
 
 
 HEAD = 'device = "rotor_1x3"\n'
@@ -271,7 +271,7 @@ HEAD = 'device = "rotor_1x3"\n'
 @pytest.mark.parametrize(
     ("text", "message", "key"),
     [
-        ("", 'missing key "device"', "device"),
+        ("", 'a recipe names a "device", a [samples] file, or both', ""),
         ("device = 3", "device must be a text", "device"),
         ('device = ""', "must not be blank", "device"),
         (HEAD + "sed = 3", 'did you mean "seed"', "sed"),
@@ -302,7 +302,7 @@ def test_broken_recipe_is_one_sentence_that_names_file_and_key(tmp_path, text, m
     with pytest.raises(CardError, match=re.escape(message)) as caught:
         load_recipe(file)
     assert len(str(caught.value).splitlines()) == 1
-    assert str(caught.value).endswith(f"[{file}: {key}]")
+    assert str(caught.value).endswith(f"[{file}: {key}]" if key else f"[{file}]")
 
 
 def test_recipe_of_an_unknown_device_or_name_is_refused(tmp_path):

@@ -51,19 +51,19 @@ SAMPLE_FAMILIES: dict[str, Callable[..., Iterator[Candidate]]] = {
 
 def sample_members(family: str, samples: Samples, options: Mapping[str, Any]) -> Iterator[Candidate]:
     """The candidates of a family of `SAMPLE_FAMILIES`. Raises InputError for options that it does not have."""
-    make = SAMPLE_FAMILIES[family]
-    _check_options(family, make, options)
-    return make(samples, **options)
+    check_options(family, options)
+    return SAMPLE_FAMILIES[family](samples, **options)
 
 
 def members(family: str, geometry: Geometry, region: Shell, options: Mapping[str, Any]) -> Iterator[Member]:
     """The candidates of a family. Raises InputError for options that it does not have."""
-    make = FAMILIES[family]
-    _check_options(family, make, options)
-    return make(geometry, region, **options)
+    check_options(family, options)
+    return FAMILIES[family](geometry, region, **options)
 
 
-def _check_options(family: str, make: Callable[..., Any], options: Mapping[str, Any]) -> None:
+def check_options(family: str, options: Mapping[str, Any]) -> None:
+    """Raise InputError for options that a family does not have."""
+    make = FAMILIES[family] if family in FAMILIES else SAMPLE_FAMILIES[family]
     given = ("geometry", "region", "window", "samples")
     known = [name for name in inspect.signature(make).parameters if name not in given]
     for name in options:
