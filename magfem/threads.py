@@ -1,13 +1,15 @@
-"""Share the points of one compiled evaluation among threads; kernels release the interpreter lock."""
+"""How many threads: one compiled evaluation shares its points among them, small algebra takes one."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from itertools import pairwise
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 
 def in_chunks(run: Callable[[slice], None], count: int, at_least: int, block: int = 1) -> None:
@@ -25,6 +27,17 @@ def in_chunks(run: Callable[[slice], None], count: int, at_least: int, block: in
     bounds[-1] = count
     with ThreadPoolExecutor(workers) as pool:
         list(pool.map(run, (slice(a, b) for a, b in pairwise(bounds))))
+
+
+@contextmanager
+def one_thread_for_algebra() -> Iterator[None]:
+    """Within it, BLAS and LAPACK take one thread.
+
+    A fit decomposes many small matrices, on which threads spend more time waiting for each other than working: with
+    two of them on a busy machine of two cores more than ten times as long as one.
+    """
+    with threadpool_limits(limits=1, user_api="blas"):
+        yield
 
 
 def _processors() -> int:

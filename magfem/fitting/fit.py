@@ -24,6 +24,7 @@ from magfem.fitting.sampling import LayeredData, layer_errors, sample, worst_pla
 from magfem.fitting.selection import Fitted, choose, climb
 from magfem.geometry import Geometry
 from magfem.samples import Samples
+from magfem.threads import one_thread_for_algebra
 
 log = logging.getLogger("magfem")
 
@@ -41,9 +42,11 @@ def fit(source: Field | Samples, recipe: Recipe | None = None) -> FieldModel:
     """
     if not isinstance(recipe, Recipe | None):
         raise InputError("fit takes a Recipe: magfem.fitting.load_recipe reads one from a file")
-    if isinstance(source, Samples):
-        return fit_samples(source, recipe)
-    recipe = recipe or Recipe()
+    with one_thread_for_algebra():
+        return fit_samples(source, recipe) if isinstance(source, Samples) else _fit_field(source, recipe or Recipe())
+
+
+def _fit_field(source: Field, recipe: Recipe) -> FieldModel:
     geometry = _device(source, recipe)
     recipe = recipe.of(geometry)
     field = _circuit(source, recipe)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.optimize import brentq
 
 from magfem.errors import InputError
 from magfem.fitting.model import FieldModel
@@ -18,14 +19,15 @@ from magfem.typing import Floats
 class Scale:
     """A factor that single measurements ask of a model.
 
-    factor: weighted least squares.  deviation: its standard deviation, the larger of what the readings' uncertainties
-    and what their scatter make it.  implied: (n,) the factor that each alone asks for.  chi: root mean square of the
-    residuals over the uncertainties; None where these are not known.
+    factor: their weighted mean.  deviation: its standard deviation.  implied: (n,) the factor that each alone asks for.
+    scatter: standard deviation of the implied factors beyond what the readings' uncertainties explain.  chi: root mean
+    square of the readings' residuals over their uncertainties, had they no other error; None where these are not known.
     """
 
     factor: float
     deviation: float
     implied: Floats
+    scatter: float
     chi: float | None
 
     def to_dict(self) -> dict[str, Any]:
@@ -34,12 +36,17 @@ class Scale:
             "factor": self.factor,
             "deviation": self.deviation,
             "implied": self.implied.tolist(),
+            "scatter": self.scatter,
             "standardised_residual": self.chi,
         }
 
 
 def scale_to(model: FieldModel, measurements: Sequence[Measurement]) -> Scale:
-    """The factor that fits single components best, each weighted by its uncertainty, or by its size without one.
+    """The factor that single components agree on best.
+
+    Each implies a factor with the deviation of its reading. Where they disagree by more than that, distances or
+    backgrounds are off as well, and a scatter common to all is added until their squares are what chance makes them
+    (Paule & Mandel, J. Res. Natl. Bur. Stand. 87, 377 (1982)); else the nearest reading alone would decide.
 
     Raises InputError for none, for components that the model says vanish, and where nothing says how sure the factor
     is: a single measurement or one of zero without an uncertainty; OutsideRegionError outside the model's region.
@@ -55,14 +62,22 @@ def scale_to(model: FieldModel, measurements: Sequence[Measurement]) -> Scale:
     if not np.all(np.abs(predicted) > 1e-9 * np.abs(predicted).max()):
         raise InputError("a scale cannot be told from a component that vanishes in the model")
     known = all(one.uncertainty is not None for one in measurements)
-    sigma = np.array([one.uncertainty or abs(one.value) for one in measurements])
-    weight = (predicted / sigma) ** 2
     implied = value / predicted
+    reading = np.array([one.uncertainty or 0.0 for one in measurements]) / np.abs(predicted)
+
+    def excess(variance: float) -> float:
+        """Sum of squares over what chance makes it, less one, with a common `variance` added."""
+        weight = 1.0 / (reading**2 + variance)
+        mean = float(weight @ implied / weight.sum())
+        return float(weight @ (implied - mean) ** 2) - float(implied.size - 1)
+
+    smallest, largest = 1e-12 * float(implied @ implied), 10 * float(np.ptp(implied) ** 2)
+    alike = implied.size < 2 or largest <= smallest or excess(smallest) <= 0
+    scatter2 = 0.0 if alike else float(brentq(excess, smallest, largest))
+    weight = 1.0 / (reading**2 + max(scatter2, smallest if not known else 0.0))
     factor = float(weight @ implied / weight.sum())
-    freedom = max(len(value) - 1, 1)
-    spread = float(np.sqrt(np.sum(((value - factor * predicted) / sigma) ** 2) / freedom))
-    stated = 1.0 if known else 0.0
-    return Scale(factor, float(max(spread, stated) / np.sqrt(weight.sum())), implied, spread if known else None)
+    chi = float(np.sqrt((excess(0.0) + implied.size - 1) / max(implied.size - 1, 1))) if known else None
+    return Scale(factor, float(1 / np.sqrt(weight.sum())), implied, float(np.sqrt(scatter2)), chi)
 
 
 def scaled(model: FieldModel, scale: Scale) -> FieldModel:

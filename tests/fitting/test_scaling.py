@@ -39,16 +39,30 @@ def test_readings_along_a_finite_cylinder_imply_it_by_magpylib_too(rotor_model, 
 
 
 def test_deviation_covers_the_scatter_of_the_readings(rotor, rotor_model) -> None:
-    """The readings disagree by far more than 0.5 µT: the factor's deviation is that of their scatter."""
+    """The readings disagree by far more than 0.5 µT: a common scatter makes their squares what chance makes them."""
     measurements = [reading(x, B) for x, B in zip(DISTANCES, READINGS, strict=True)]
     scale = scale_to(rotor_model, measurements)
-    predicted = np.array(READINGS) / scale.implied
-    least = np.linalg.lstsq(predicted[:, None], np.array(READINGS), rcond=None)
-    assert scale.factor == pytest.approx(float(least[0][0]), rel=1e-12)
-    variance = float(least[1][0]) / 3 / float(predicted @ predicted)
-    assert scale.deviation == pytest.approx(np.sqrt(variance), rel=1e-9)
-    assert scale.chi == pytest.approx(np.sqrt(float(least[1][0]) / 3) / UNCERTAINTY, rel=1e-9) and scale.chi > 3
-    assert scale.deviation > UNCERTAINTY / np.sqrt(predicted @ predicted)
+    alone = scale.implied * 0.5e-6 / np.array(READINGS)
+    variance = alone**2 + scale.scatter**2
+    assert np.sum((scale.implied - scale.factor) ** 2 / variance) == pytest.approx(len(READINGS) - 1, rel=1e-9)
+    assert scale.factor == pytest.approx(np.average(scale.implied, weights=1 / variance), rel=1e-12)
+    assert scale.deviation == pytest.approx(np.sum(1 / variance) ** -0.5, rel=1e-12)
+    assert scale.chi is not None and scale.chi > 3
+
+
+def test_deviation_is_that_of_many_draws(rotor_model) -> None:
+    """A true factor 0.9, distances off by a random 2 %: the stated deviation is the factors' own scatter."""
+    rng, found = np.random.default_rng(4), []
+    for _ in range(60):
+        values = [
+            0.9 * float(rotor_model.B([x, 0.0, 0.0])[0]) * (1 + 0.06 * rng.normal()) + 0.5e-6 * rng.normal()
+            for x in DISTANCES
+        ]
+        found.append(scale_to(rotor_model, [reading(x, B) for x, B in zip(DISTANCES, values, strict=True)]))
+    factors = np.array([one.factor for one in found])
+    stated = np.sqrt(np.mean([one.deviation**2 for one in found]))
+    assert abs(factors.mean() - 0.9) < 3 * factors.std() / np.sqrt(60)
+    assert stated == pytest.approx(factors.std(), rel=0.35)  # three degrees of freedom each
 
 
 def test_readings_that_agree_have_the_deviation_of_their_uncertainty(rotor_model, rotor_peer) -> None:
