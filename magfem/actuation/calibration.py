@@ -39,6 +39,7 @@ from magfem.fitting.least_squares import Ridge
 from magfem.fitting.measured_fit import regions
 from magfem.fitting.provenance import versions_and_date
 from magfem.samples import SystemSamples
+from magfem.threads import one_thread_for_algebra
 from magfem.typing import ArrayLike, Floats, Outside, Points, Vectors
 
 log = logging.getLogger("magfem")
@@ -92,6 +93,7 @@ class Calibration:
         return deviation.reshape(array.shape)
 
 
+@one_thread_for_algebra()
 def calibrate(
     samples: SystemSamples,
     *,
