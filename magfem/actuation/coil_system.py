@@ -14,6 +14,7 @@ from scipy.spatial.transform import RigidTransform
 from magfem.errors import InputError
 from magfem.fields.field import OUTSIDE, Evaluated, Unit, as_points, promised_points
 from magfem.fields.region import Everywhere, Intersection, PlacedRegion, Region
+from magfem.fields.term_groups import TermGroups
 from magfem.fields.terms import Terms, concatenate
 from magfem.fields.workspace_region import bounding_ball, surely_holds
 from magfem.typing import ArrayLike, Booleans, Floats, Hessians, Jet, Outside, Points, Tensors, Vectors
@@ -21,6 +22,8 @@ from magfem.units import format_quantity, quoted
 
 ROWS = ("Bx", "By", "Bz", "dBx_dx", "dBx_dy", "dBx_dz", "dBy_dy", "dBy_dz")
 """What the eight rows of `unit_fields` are: in air these are all of B and its gradient."""
+
+_BLOCK = 16384  # points worked on at a time: every coil takes its own numbers at each
 
 _FIVE = [0, 1, 2, 4, 5]  # of the gradient's nine, row by row: the others follow from div B = 0 and curl B = 0
 
@@ -152,18 +155,31 @@ class CoilSystem:
             raise InputError(
                 f"currents {amperes.shape} do not go with points {(*lead, 3)}: give one set for all, or one for each"
             ) from None
-        total = [np.zeros(shape + (3,) * rank) for rank in range(1, order + 2)]
-        sources = [(coil.terms, amperes[..., k]) for k, coil in enumerate(self.coils)]
-        if self.background is not None:
-            sources.append((self.background, np.ones(())))
-        for terms, current in sources:
-            for rank, part in enumerate(terms.jet(flat, order), start=1):
-                total[rank - 1] += current.reshape(current.shape + (1,) * rank) * part.reshape(lead + (3,) * rank)
+        weights = amperes if self.background is None else np.append(amperes, np.ones((*amperes.shape[:-1], 1)), axis=-1)
+        if weights.ndim == 1:
+            total = self._summed(flat, weights, order, lead)
+        else:
+            which = np.broadcast_to(np.arange(len(flat)).reshape(lead), shape).ravel()
+            every = np.broadcast_to(weights, (*shape, weights.shape[-1])).reshape(-1, weights.shape[-1])
+            total = self._summed(flat[which], every, order, shape)
         if not promised.all():
             lost = np.broadcast_to(~promised.reshape(lead), shape)
             for part in total:
                 part[lost] = np.nan
         return tuple(total)
+
+    def _summed(self, flat: Points, weights: Floats, order: int, lead: tuple[int, ...]) -> list[Floats]:
+        """The jets of all groups at points (n, 3), times one weight for each (g,), or for each point and group (n, g)."""
+        total = [np.empty((len(flat), 3**rank)) for rank in range(1, order + 2)]
+        for begin in range(0, len(flat), _BLOCK):
+            block = slice(begin, begin + _BLOCK)
+            for part, jets in zip(total, self._groups.jets(flat[block], order), strict=True):
+                if weights.ndim == 1:
+                    part[block] = (weights @ jets.reshape(len(weights), -1)).reshape(-1, part.shape[1])
+                else:
+                    numbers = jets.reshape(*jets.shape[:2], -1)
+                    part[block] = np.einsum("ng,gna->na", weights[block], numbers)
+        return [part.reshape(lead + (3,) * rank) for rank, part in enumerate(total, start=1)]
 
     def at(self, currents: ArrayLike, joints: ArrayLike | None = None) -> SystemField:
         """The field of the currents (c,) A: a Field in T, whose terms are evaluated in one call."""
@@ -182,11 +198,13 @@ class CoilSystem:
         Row by row B and the independent part of its gradient; the background is not in it.
         """
         flat, promised, lead = self._checked_points(points, joints, outside)
-        rows = np.empty((len(flat), len(ROWS), len(self.coils)))
-        for k, coil in enumerate(self.coils):
-            B, gradient = coil.terms.jet(flat, 1)
-            rows[:, :3, k] = B
-            rows[:, 3:, k] = gradient.reshape(-1, 9)[:, _FIVE]
+        count = len(self.coils)
+        rows = np.empty((len(flat), len(ROWS), count))
+        for begin in range(0, len(flat), _BLOCK):
+            block = slice(begin, begin + _BLOCK)
+            B, gradient = (jets[:count] for jets in self._groups.jets(flat[block], 1))
+            rows[block, :3] = B.transpose(1, 2, 0)
+            rows[block, 3:] = gradient.reshape(count, -1, 9)[:, :, _FIVE].transpose(1, 2, 0)
         rows[~promised] = np.nan
         return rows.reshape(*lead, *rows.shape[1:])
 
@@ -221,6 +239,12 @@ class CoilSystem:
         from magfem.actuation.system_file import write_system
 
         write_system(self, Path(path))
+
+    @cached_property
+    def _groups(self) -> TermGroups:
+        """Every coil's terms on its own, the background's last."""
+        background = [] if self.background is None else [self.background]
+        return TermGroups([*(coil.terms for coil in self.coils), *background])
 
     @cached_property
     def _limits(self) -> Floats:

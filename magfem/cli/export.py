@@ -62,7 +62,6 @@ def add(commands: CommandLine) -> None:
         "flows. docs/exchange.md shows the other side of each.",
         [
             "magfem export ring_magnet_4x1.5x1 --to c -o ring.h",
-            "magfem export ring.json --to magpylib -o ring.py",
             'magfem export ring.json --to vti -o ring.vti --grid 81 --bounds "-4 mm, 4 mm, -4 mm, 4 mm, 1 mm, 6 mm"',
             "magfem export ring.json --to samples -o ring.csv --points points.csv --gradient",
             "magfem export bigmag --to mpem -o bigmag.yaml",
