@@ -169,7 +169,7 @@ class CoilSystem:
         return tuple(total)
 
     def _summed(self, flat: Points, weights: Floats, order: int, lead: tuple[int, ...]) -> list[Floats]:
-        """The jets of all groups at points (n, 3), times one weight for each (g,), or for each point and group (n, g)."""
+        """The jets of all groups at points (n, 3), times a weight for each (g,), or for each at each point (n, g)."""
         total = [np.empty((len(flat), 3**rank)) for rank in range(1, order + 2)]
         for begin in range(0, len(flat), _BLOCK):
             block = slice(begin, begin + _BLOCK)
