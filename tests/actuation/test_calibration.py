@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
 
 import numpy as np
@@ -203,13 +202,11 @@ def test_held_out_regions_are_those_of_fits_without_them():
     np.testing.assert_allclose(fit.table.ravel(), whole, atol=1e-10)
 
 
-def test_twenty_thousand_rows_take_seconds():
-    samples = octomag_samples(10, per=160)
-    calibrate(samples.subset(slice(0, None, 40)))  # compiles
-    start = time.process_time()
-    found = calibrate(samples)
-    assert time.process_time() - start < 8  # 1.8 s of one core, up to degree 6
+def test_twenty_thousand_rows_are_one_fit():
+    """Memory and time grow with the rows alone: benchmarks/fits.py measures them."""
+    found = calibrate(octomag_samples(10, per=160))
     assert found.report["rows"] == 20000
+    assert found.report["degree"] >= calibrate(octomag_samples(10, per=8)).report["degree"]  # more rows tell more
 
 
 # Linearity and saturation
