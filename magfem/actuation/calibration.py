@@ -35,8 +35,8 @@ from magfem.fields.field import as_points, promised_points
 from magfem.fields.region import Region
 from magfem.fields.terms import HIGHEST_DEGREE, Terms, concatenate
 from magfem.fields.workspace_region import Ball, Box, bounding_ball
+from magfem.fitting.held_out import regions
 from magfem.fitting.least_squares import Ridge
-from magfem.fitting.measured_fit import regions
 from magfem.fitting.provenance import versions_and_date
 from magfem.samples import SystemSamples
 from magfem.threads import one_thread_for_algebra

@@ -2,7 +2,7 @@
 
 A three-axis sensor at the nominal place p of the measurement's frame reads, of a source with the field b in its own,
 
-    y_k = g · [S (R b(Rᵀ(p + o_k − c)))]_k + b0_k,
+    y_k = g · [Sᵀ R b(Rᵀ(p + o_k − c))]_k + b0_k,
 
 with the source's centre c and rotation R (tilt), the sensor's rotation S (turn), the offset o_k of the element that
 measures component k, the gain g and a static background b0. (5.1–5.3 have S, b0 and two components of c.) c, R, S, o
@@ -41,8 +41,7 @@ ALIASES = {"height": "centre_z"}
 class Alignment:
     """Which parameters of a measurement are free, and within which bounds.
 
-    bounds: by name (`NAMES`), lower and upper, m, rad or a factor; the start is their middle. All others are fixed: at
-    zero, the gain at one.
+    bounds: by name (`NAMES`), lower and upper, m, rad or a factor. All others are fixed: at zero, the gain at one.
     """
 
     bounds: Mapping[str, tuple[float, float]]
@@ -71,17 +70,36 @@ class Alignment:
         """(q,)"""
         return np.array([high for _, high in self.bounds.values()])
 
+    @cached_property
+    def start(self) -> Floats:
+        """Where to begin (q,): the middle of the bounds, for a gain one if it may be."""
+        middle = 0.5 * (self.lower + self.upper)
+        gain = np.array([name == "gain" for name in self.names], dtype=bool)
+        begin: Floats = np.where(gain, np.clip(1.0, self.lower, self.upper), middle)
+        return begin
+
+    def without(self, name: str) -> Alignment:
+        """The same with one parameter fixed."""
+        return Alignment({key: pair for key, pair in self.bounds.items() if key != name})
+
     def values(self, theta: Floats) -> dict[str, float]:
         """All parameters by name, fixed ones too."""
         fixed = {name: 0.0 for name in NAMES} | {"gain": 1.0}
         return fixed | dict(zip(self.names, theta.tolist(), strict=True))
+
+    def in_source_frame(self, points: Points, theta: Floats) -> Points:
+        """Where nominal `points` (n, 3) m of the measurement lie in the source's own frame."""
+        now = self.values(theta)
+        centre, tilt = (np.array([now[name] for name in GROUPS[group]]) for group in ("centre", "tilt"))
+        found: Points = Rotation.from_rotvec(tilt).inv().apply(points - centre)
+        return found
 
     def columns(self, candidate: Candidate, points: Points, theta: Floats) -> Floats:
         """What each of the candidate's parameters makes the sensor read at nominal `points` (n, 3): (p, n, 3)."""
         now = self.values(theta)
         centre, tilt, turn = (np.array([now[name] for name in GROUPS[group]]) for group in ("centre", "tilt", "turn"))
         source, sensor = Rotation.from_rotvec(tilt), Rotation.from_rotvec(turn)
-        rotation = sensor.as_matrix() @ source.as_matrix()
+        rotation = sensor.as_matrix().T @ source.as_matrix()
         offsets = np.array([now[name] for name in GROUPS["offsets"]]).reshape(2, 3)
         if not offsets.any():
             (B,) = candidate.columns(source.inv().apply(points - centre), 0)

@@ -9,6 +9,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 from scipy import linalg
 from scipy.optimize import least_squares
+from scipy.stats.qmc import Halton
 
 from magfem.fitting.alignment import Alignment
 from magfem.fitting.candidate import Candidate, Displaceable
@@ -21,6 +22,8 @@ Weighting: TypeAlias = Literal["sigma", "absolute", "relative"]
 Loss: TypeAlias = Literal["squares", "huber"]
 
 _HUBER = 1.345  # standard deviations: 95 % as sharp as plain squares where the noise is normal
+_SPREAD = 32  # starts over the bounds of the alignment
+_MOST_POINTS = 300  # samples that a search takes; what it finds is refined on all
 _STEP = 1e-6  # of the bounds' distance, for the derivatives by the free parameters
 _REFINED = 3  # of the starts
 CONDITION = 1e7
@@ -58,10 +61,20 @@ class Measurement:
 
     @cached_property
     def starts(self) -> Floats:
-        """Where to search from (k, q)."""
-        middle = 0.5 * (self.alignment.lower + self.alignment.upper)
+        """Where to search from (k, q): the members' own, and places spread over the bounds of the alignment."""
         places = self.member.start if isinstance(self.member, Displaceable) else np.empty((1, 0))
-        return np.concatenate([places, np.tile(middle, (len(places), 1))], axis=1)
+        own = np.hstack([places, np.tile(self.alignment.start, (len(places), 1))])
+        if not self.alignment.names:
+            return own
+        share = Halton(len(self.alignment.names), scramble=False).random(_SPREAD + 1)[1:]  # the first is a corner
+        spread = self.alignment.lower + share * (self.alignment.upper - self.alignment.lower)
+        return np.vstack([own, np.hstack([places[np.arange(_SPREAD) % len(places)], spread])])
+
+    @cached_property
+    def thinned(self) -> Measurement:
+        """The same with some hundreds of the samples at most, to search with."""
+        step = -(-self.samples.count // _MOST_POINTS)
+        return self if step == 1 else replace(self, samples=self.samples.subset(slice(None, None, step)))
 
     @cached_property
     def scale(self) -> Floats:
@@ -169,6 +182,7 @@ class MeasuredFit:
         return self.solved.residual / self.weight
 
 
+_STOPS = ("xtol", "ftol", "gtol")
 _ALIKE = 5e-3  # of a nonlinear parameter's effect: where the linear ones leave less, a model's own error decides
 _DECIDED = 1 / 3  # of the bounds' half distance: a deviation above that is made by the bounds and not by the data
 _ROUNDING = 1e-6  # of the data: no noise is smaller, for the slopes are no better
@@ -177,7 +191,9 @@ _ROUNDING = 1e-6  # of the data: no noise is smaller, for the slopes are no bett
 def solve_measurement(measurement: Measurement) -> MeasuredFit:
     """Fit all parameters; outliers weigh less where the loss says so."""
     weight = np.ones(measurement.target.size)
-    theta = _project(measurement, weight, measurement.starts)
+    few = measurement.thinned
+    theta = _project(few, np.ones(few.target.size), measurement.starts, 1e-6)
+    theta = _project(measurement, weight, theta[None])
     for _ in range(20 if measurement.loss == "huber" else 0):
         residual = measurement.solve(theta, weight).residual / weight
         spread = 1.0 if measurement.variance else max(1.4826 * float(np.median(np.abs(residual))), 1e-300)
@@ -190,7 +206,7 @@ def solve_measurement(measurement: Measurement) -> MeasuredFit:
     return _judged(measurement, theta, solved, weight) if measurement.free else _linear(measurement, solved, weight)
 
 
-def _project(measurement: Measurement, weight: Floats, starts: Floats) -> Floats:
+def _project(measurement: Measurement, weight: Floats, starts: Floats, tolerance: float = 1e-12) -> Floats:
     """The nonlinear parameters (q,) that leave the least, by variable projection from the most promising starts."""
     if not measurement.free:
         return np.empty(0)
@@ -219,7 +235,7 @@ def _project(measurement: Measurement, weight: Floats, starts: Floats) -> Floats
 
     promising = sorted(starts, key=lambda start: float(np.sum(residual(start) ** 2)))[:_REFINED]
     found = [
-        least_squares(residual, start, jacobian, (low, high), x_scale=high - low, xtol=1e-12, ftol=1e-12, gtol=1e-12)
+        least_squares(residual, start, jacobian, (low, high), x_scale=high - low, **dict.fromkeys(_STOPS, tolerance))
         for start in promising
     ]
     best: Floats = min(found, key=lambda one: float(one.cost)).x

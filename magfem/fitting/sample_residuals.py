@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
 from magfem.errors import InputError
-from magfem.fitting.alignment import GROUPS, NAMES, Alignment
+from magfem.fitting.alignment import NAMES, Alignment
 from magfem.fitting.candidate import Candidate
 from magfem.fitting.located_errors import LocatedErrors, distance_in, largest_sizes
 from magfem.fitting.model import FieldModel
@@ -106,22 +105,26 @@ class _Alignment:
 
     @classmethod
     def of(cls, model: FieldModel) -> _Alignment:
-        """As the model's report has it; the gain is in its coefficients."""
+        """As the model's report has it."""
         found = model.report.get("measurement") or {}
         free = {name: float(one["value"]) for name, one in found.get("free", {}).items() if name in NAMES}
-        free.pop("gain", None)
         background = found.get("background", {}).get("value", [0.0, 0.0, 0.0])
         return cls(free, np.array(background, dtype=float))
 
+    @property
+    def _fixed(self) -> Alignment:
+        return Alignment({name: (value - 1.0, value + 1.0) for name, value in self.values.items()})
+
+    @property
+    def _theta(self) -> Floats:
+        return np.array(list(self.values.values()))
+
     def places(self, points: Points) -> Points:
         """Nominal points (n, 3) in the source's frame."""
-        centre, tilt = (np.array([self.values.get(name, 0.0) for name in GROUPS[key]]) for key in ("centre", "tilt"))
-        placed: Points = Rotation.from_rotvec(tilt).inv().apply(points - centre)
-        return placed
+        return self._fixed.in_source_frame(points, self._theta)
 
     def reading(self, model: FieldModel, points: Points) -> Floats:
         """What the sensor reads (n, 3) at nominal points (n, 3), all of them in the region."""
         whole = Candidate("", "", model.lowered, np.zeros(model.lowered.coefficient.size, dtype=np.int64))
-        alignment = Alignment({name: (value - 1.0, value + 1.0) for name, value in self.values.items()})
-        (reading,) = alignment.columns(whole, points, np.array(list(self.values.values())))
+        (reading,) = self._fixed.columns(whole, points, self._theta)
         return np.asarray(reading + self.background)

@@ -40,7 +40,7 @@ def read_by_sensor(
     )
     turn = Rotation.from_rotvec(group("turn"))
     elements = [*group("offsets").reshape(2, 3), np.zeros(3)]
-    components = [turn.apply(magnet.getB(points + element))[:, k] for k, element in enumerate(elements)]
+    components = [turn.inv().apply(magnet.getB(points + element))[:, k] for k, element in enumerate(elements)]
     read: Floats = values["gain"] * np.stack(components, axis=-1) + background
     return read
 

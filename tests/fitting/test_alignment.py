@@ -81,7 +81,7 @@ def test_gain_beside_a_free_strength_is_named_and_their_product_found() -> None:
 def test_rolling_about_a_straight_scan_is_named() -> None:
     """On one line along x, magnet and sensor may turn about that line together, and nothing is read differently."""
     line = np.column_stack([np.linspace(-15e-3, 15e-3, 61), np.zeros(61), np.full(61, 7e-3)])
-    rolled = {"centre_y": 7e-3 * np.sin(0.2), "centre_z": 7e-3 * (1 - np.cos(0.2)), "tilt_x": 0.2, "turn_x": -0.2}
+    rolled = {"centre_y": 7e-3 * np.sin(0.2), "centre_z": 7e-3 * (1 - np.cos(0.2)), "tilt_x": 0.2, "turn_x": 0.2}
     rng = np.random.default_rng(3)
     B = read_by_sensor({}, line)
     np.testing.assert_allclose(read_by_sensor(rolled, line), B, atol=1e-12)
