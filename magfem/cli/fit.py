@@ -148,6 +148,7 @@ def _text(model: FieldModel, path: Path) -> str:
         ("held out", f"{_errors(report['heldout'])} (max), {report['heldout']['points']} points"),
         *(_measured_rows(report) if "measurement" in report else [("FEM's share", _errors(report["fem"]))]),
         ("stated bound", _errors(report["bound"])),
+        *(_scale_rows(report["scale"]) if "scale" in report else []),
         *([("moment", moment_text(model.moment))] if model.moment.any() else []),
         ("model", str(path)),
     ]
@@ -170,6 +171,15 @@ def _errors(errors: dict[str, Any]) -> str:
     return f"{B:.1e} in B, {gradient:.1e} in the gradient"
 
 
+def _scale_rows(scale: dict[str, Any]) -> list[tuple[str, str]]:
+    """The factor that single readings ask for."""
+    implied = ", ".join(f"{value:.4g}" for value in scale["implied"])
+    rows = [("scale", f"{scale['factor']:.5g} ± {scale['deviation']:.2g}, the readings imply {implied}")]
+    if (scale["standardised_residual"] or 0.0) > 2.0:
+        rows.append(("", "the readings disagree by more than their uncertainties: distances or a background are off"))
+    return rows
+
+
 def _measured_rows(report: dict[str, Any]) -> list[tuple[str, str]]:
     """What a fit of samples found besides the model."""
     found, uncertainty, heldout = report["measurement"], report["uncertainty"], report["heldout"]["B"]
@@ -183,9 +193,9 @@ def _measured_rows(report: dict[str, Any]) -> list[tuple[str, str]]:
         rows.append(("", "the model's own error is larger than the noise: deviations say too little"))
     for name, one in found["free"].items():
         rows.append((name, _with_deviation(one["value"], one["deviation"], _dimension(name))))
-    if "remanence" in found:
-        one = found["remanence"]
-        rows.append(("remanence", _with_deviation(one["value"], one["deviation"], "flux density")))
+    for name, dimension in (("remanence", "flux density"), ("current", "current")):
+        if name in found:
+            rows.append((name, _with_deviation(found[name]["value"], found[name]["deviation"], dimension)))
     if "background" in found:
         rows.append(("background", ", ".join(format_quantity(b, "flux density") for b in found["background"]["value"])))
     return rows

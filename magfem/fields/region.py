@@ -139,7 +139,10 @@ class Shell:
         """Points (n, 3) moved onto the side of the window that faces the hull: its plane, wall or offset surface."""
         moved = points.copy()
         if self.z[0] > 0 or self.z[1] < 0:
+            side = 1.0 if self.z[0] > 0 else -1.0
             moved[:, 2] = self.z[0] if self.z[0] > 0 else self.z[1]
+            for _ in range(4):  # where that side lies nearer than the clearance, the clearance is the near side
+                moved[:, 2] += side * np.maximum(self.clearance - self.hull.distance(moved), 0.0)
         elif self.rho[0] > 0:
             moved[:, :2] *= self.rho[0] / np.maximum(np.hypot(moved[:, 0], moved[:, 1]), 1e-300)[:, None]
         return moved

@@ -25,7 +25,8 @@ _HUBER = 1.345  # standard deviations: 95 % as sharp as plain squares where the 
 _SPREAD = 32  # starts over the bounds of the alignment
 _MOST_POINTS = 300  # samples that a search takes; what it finds is refined on all
 _STEP = 1e-6  # of the bounds' distance, for the derivatives by the free parameters
-_REFINED = 3  # of the starts
+_REFINED = 3  # of the starts, besides the first
+_AS_LITTLE = 1e-3  # of the least squares: places that leave so little more are as good
 CONDITION = 1e7
 
 
@@ -207,7 +208,11 @@ def solve_measurement(measurement: Measurement) -> MeasuredFit:
 
 
 def _project(measurement: Measurement, weight: Floats, starts: Floats, tolerance: float = 1e-12) -> Floats:
-    """The nonlinear parameters (q,) that leave the least, by variable projection from the most promising starts."""
+    """The nonlinear parameters (q,) that leave the least, by variable projection from the most promising starts.
+
+    The first start is among them. Of places that leave as little as the best the one nearest to it is taken: where
+    the data leave a whole valley, that is the least that has to be believed.
+    """
     if not measurement.free:
         return np.empty(0)
     low, high = measurement.bounds
@@ -233,13 +238,15 @@ def _project(measurement: Measurement, weight: Floats, starts: Floats, tolerance
         followed: Floats = one.basis @ (one.basis.T @ slopes)
         return followed - slopes
 
-    promising = sorted(starts, key=lambda start: float(np.sum(residual(start) ** 2)))[:_REFINED]
+    promising = [starts[0], *sorted(starts[1:], key=lambda start: float(np.sum(residual(start) ** 2)))[:_REFINED]]
     found = [
         least_squares(residual, start, jacobian, (low, high), x_scale=high - low, **dict.fromkeys(_STOPS, tolerance))
         for start in promising
     ]
-    best: Floats = min(found, key=lambda one: float(one.cost)).x
-    return best
+    least = min(float(one.cost) for one in found) * (1.0 + _AS_LITTLE)
+    alike = [one.x for one in found if float(one.cost) <= least]
+    nearest: Floats = min(alike, key=lambda theta: float(np.sum(((theta - starts[0]) / (high - low)) ** 2)))
+    return nearest
 
 
 def _linear(measurement: Measurement, solved: LeastSquares, weight: Floats) -> MeasuredFit:

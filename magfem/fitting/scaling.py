@@ -53,15 +53,19 @@ def scale_to(model: FieldModel, measurements: Sequence[Measurement]) -> Scale:
     """
     if not measurements:
         raise InputError("a scale needs one measurement or more")
-    if len(measurements) == 1 and measurements[0].uncertainty is None:
+    if model.unit != "T":
+        raise InputError("measurements in T do not scale a model per ampere: state the current instead")
+    known = all(one.uncertainty is not None for one in measurements)
+    if not known and any(one.uncertainty is not None for one in measurements):
+        raise InputError("either all measurements have an uncertainty or none: they could not be weighed otherwise")
+    if len(measurements) == 1 and not known:
         raise InputError("a scale from a single measurement needs its uncertainty")
-    if any(one.uncertainty is None and one.value == 0 for one in measurements):
+    if not known and any(one.value == 0 for one in measurements):
         raise InputError("a measurement of zero needs an uncertainty: it cannot be weighed by its size")
     value = np.array([one.value for one in measurements])
     predicted = np.array([float(model.B(one.position) @ one.direction) for one in measurements])
     if not np.all(np.abs(predicted) > 1e-9 * np.abs(predicted).max()):
         raise InputError("a scale cannot be told from a component that vanishes in the model")
-    known = all(one.uncertainty is not None for one in measurements)
     implied = value / predicted
     reading = np.array([one.uncertainty or 0.0 for one in measurements]) / np.abs(predicted)
 
@@ -73,8 +77,10 @@ def scale_to(model: FieldModel, measurements: Sequence[Measurement]) -> Scale:
 
     smallest, largest = 1e-12 * float(implied @ implied), 10 * float(np.ptp(implied) ** 2)
     alike = implied.size < 2 or largest <= smallest or excess(smallest) <= 0
+    if alike and not known:
+        raise InputError("measurements that agree exactly need their uncertainty: nothing says how sure the factor is")
     scatter2 = 0.0 if alike else float(brentq(excess, smallest, largest))
-    weight = 1.0 / (reading**2 + max(scatter2, smallest if not known else 0.0))
+    weight = 1.0 / (reading**2 + scatter2)
     factor = float(weight @ implied / weight.sum())
     chi = float(np.sqrt((excess(0.0) + implied.size - 1) / max(implied.size - 1, 1))) if known else None
     return Scale(factor, float(1 / np.sqrt(weight.sum())), implied, float(np.sqrt(scatter2)), chi)

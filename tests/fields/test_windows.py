@@ -175,3 +175,11 @@ def test_damaged_regions_are_refused_by_the_model_file(data, tmp_path) -> None:
 def test_other_regions_are_in_no_model_file() -> None:
     with pytest.raises(InputError, match="of type Intersection cannot be written"):
         region_to_dict(Intersection((SHELL, BALL)))
+
+
+def test_window_that_begins_at_the_clearance_of_a_thin_body_has_its_near_points_there() -> None:
+    """Half a coil's thickness makes its plane z = clearance lie nearer to the hull than the clearance."""
+    thin = Shell(CylinderHull(12e-3, 9e-6), 0.5e-3, 5e-3, (0.5e-3, 5e-3), (0.0, 6e-3))
+    points = thin.layers(np.random.default_rng(0), 8, 20, 10)
+    assert thin.contains(points).all()
+    np.testing.assert_allclose(thin.hull.distance(points[8:]), 0.5e-3, rtol=1e-9)

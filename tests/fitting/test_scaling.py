@@ -78,13 +78,11 @@ def test_exact_readings_give_the_exact_factor(rotor_model) -> None:
     directions = rng.normal(size=points.shape)
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     values = 1.07 * np.sum(rotor_model.B(points) * directions, axis=1)
-    for uncertainty in (1e-6, None):
-        scale = scale_to(
-            rotor_model,
-            [Measurement(*one, uncertainty, "") for one in zip(points, directions, values.tolist(), strict=True)],
-        )
-        assert scale.factor == pytest.approx(1.07, rel=1e-12)
-        np.testing.assert_allclose(scale.implied, 1.07, rtol=1e-10)
+    scale = scale_to(
+        rotor_model, [Measurement(*one, 1e-6, "") for one in zip(points, directions, values.tolist(), strict=True)]
+    )
+    assert scale.factor == pytest.approx(1.07, rel=1e-12)
+    np.testing.assert_allclose(scale.implied, 1.07, rtol=1e-10)
 
 
 def test_readings_without_uncertainty_count_by_their_size(rotor_model) -> None:
@@ -139,3 +137,20 @@ def test_readings_that_nothing_weighs_are_refused(rotor_model) -> None:
         scale_to(rotor_model, [reading(10e-3, 411e-6, None)])
     with pytest.raises(InputError, match="of zero needs an uncertainty"):
         scale_to(rotor_model, [reading(10e-3, 411e-6, None), reading(20e-3, 0.0, None)])
+
+
+def test_readings_that_cannot_be_weighed_are_refused(rotor_model) -> None:
+    known, unknown = reading(10e-3, 411e-6), Measurement(np.array([0.02, 0, 0]), np.array([1.0, 0, 0]), 55e-6, None, "")
+    with pytest.raises(InputError, match="either all measurements have an uncertainty or none"):
+        scale_to(rotor_model, [known, unknown])
+    exact = [
+        Measurement(np.array([x, 0, 0]), np.array([1.0, 0, 0]), float(rotor_model.B([x, 0, 0])[0]), None, "")
+        for x in DISTANCES
+    ]
+    with pytest.raises(InputError, match="agree exactly"):
+        scale_to(rotor_model, exact)
+
+
+def test_a_model_per_ampere_is_not_scaled_by_readings_in_T() -> None:
+    with pytest.raises(InputError, match="per ampere"):
+        scale_to(magfem.load_model("bigmag_air"), [reading(50e-3, 1e-3)])

@@ -18,7 +18,9 @@ POLAR = 90.0  # degrees from the axis of magnetisation
 def azimuth_ring(region: Shell, direction: Floats) -> tuple[float, Points]:
     """Radius (m) and points (n, 3) of a circle about the axis of magnetisation, once round, near the device."""
     radius = region.hull.radius + region.clearance
-    frame = frame_about(direction, np.array([0.0, 0.0, 1.0]))
+    axis = np.array([0.0, 0.0, 1.0])
+    along = np.linalg.norm(np.cross(direction, axis)) < 1e-6 * np.linalg.norm(direction)
+    frame = frame_about(direction, None if along else axis)
     angle = np.radians(np.linspace(0, 360, _COUNT))
     x, y = frame[:, 0], frame[:, 1]
     return radius, radius * (np.cos(angle)[:, None] * x + np.sin(angle)[:, None] * y)
