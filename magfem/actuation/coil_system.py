@@ -28,7 +28,7 @@ _BLOCK = 16384  # points worked on at a time: every coil takes its own numbers a
 _FIVE = [0, 1, 2, 4, 5]  # of the gradient's nine, row by row: the others follow from div B = 0 and curl B = 0
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class SystemCoil:
     """A coil in its place.
 
@@ -45,6 +45,10 @@ class SystemCoil:
     def __post_init__(self) -> None:
         if self.current_limit is not None and not 0 < self.current_limit < np.inf:
             raise InputError(f"coil {quoted(self.name)}: current_limit must be positive and finite")
+
+    def __repr__(self) -> str:
+        limit = "no limit" if self.current_limit is None else format_quantity(self.current_limit, "current")
+        return f"<SystemCoil {self.name!r}: {self.own_terms.kind.size} sources, {limit}>"
 
     @cached_property
     def terms(self) -> Terms:

@@ -97,7 +97,12 @@ class Evaluated(ABC):
         return self.jet(points, 2, outside)[2]
 
     def at(self, pose: RigidTransform) -> Placed:
-        """This field moved by `pose`, which maps its frame to the new one."""
+        """This field moved by `pose`, which maps its frame to the new one. Raises InputError for what is no pose."""
+        if not isinstance(pose, RigidTransform):
+            raise InputError(
+                f"a field is placed by a scipy.spatial.transform.RigidTransform, got {type(pose).__name__}: "
+                "RigidTransform.from_translation([x, y, z]) moves it without turning it"
+            )
         return Placed(self, pose)
 
     def __mul__(self, factor: float) -> Scaled:

@@ -110,7 +110,10 @@ def _device(source: Field, recipe: Recipe) -> Geometry:
     if isinstance(source, Geometry):
         raise InputError(f"fit takes a field, {source.name} is a device: fit its solution, magfem.fit(magfem.solve(…))")
     if not isinstance(source, Field):
-        raise InputError("fit takes a field: a solution of magfem.solve, or any object with the Field interface")
+        raise InputError(
+            "fit takes a solution of magfem.solve, samples of magfem.samples.read_samples, or any object with the "
+            "Field interface"
+        )
     own: Geometry | None = getattr(source, "geometry", None)
     if own is None and recipe.geometry is None:
         raise InputError(

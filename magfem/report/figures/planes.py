@@ -11,7 +11,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from magfem.fields import Field, Shell
+from magfem.fields import Everywhere, Field, Shell
 from magfem.fields.norms import FLOOR
 from magfem.geometry import Geometry
 from magfem.report.figures.style import (
@@ -95,17 +95,19 @@ def field_map(
 ) -> Picture:
     """|B| in colours, the direction of its part in the plane as field lines, the device's outline.
 
+    What lies outside the field's region is left grey: terms of a model are infinite somewhere within the device.
     name, caption: of the picture, where those of a magnet do not fit.  counts: samples along a side, of |B| and of the
     field lines.
     """
     side, points = plane.points(counts[0])
-    size = np.linalg.norm(field.B(points, outside="extrapolate"), axis=-1) * MILLI
+    size = np.linalg.norm(field.B(points, outside="nan"), axis=-1) * MILLI
     coarse, seeds = plane.points(counts[1])
-    direction = field.B(seeds, outside="extrapolate")[..., list(plane.columns)]
+    direction = np.ma.masked_invalid(field.B(seeds, outside="nan")[..., list(plane.columns)])
     direction /= np.maximum(np.linalg.norm(direction, axis=-1, keepdims=True), 1e-300)
-    low, high = (float(q) for q in np.quantile(size, (0.002, 0.9995)))
+    low, high = (float(q) for q in np.nanquantile(size, (0.002, 0.9995)))
     with drawing():
         drawn, axes, bar_axes = square()
+        axes.set_facecolor("#c8ccd0")
         image = axes.pcolormesh(
             side * MILLI,
             side * MILLI,
@@ -138,8 +140,15 @@ def field_map(
         f"Map of the flux density in the {plane.words}, from {low:.3g} to {high:.3g} m{field.unit}, with field lines.",
         caption
         or f"|B| and field lines in the {plane.words}; the white outline is the device"
-        + (", seen through the plane in front of it." if plane.height else ", inside of which B is shown too."),
+        + _about_the_inside(field, plane),
     )
+
+
+def _about_the_inside(field: Field, plane: Plane) -> str:
+    if plane.height:
+        return ", seen through the plane in front of it."
+    everywhere = isinstance(field.region, Everywhere)
+    return ", inside of which B is shown too." if everywhere else "; grey is outside the model's region."
 
 
 def square() -> tuple[Figure, Axes, Axes]:
