@@ -142,6 +142,8 @@ FAULTS = [
     (RING + 'family = "splines"', "unknown family", ": family]"),
     (RING + 'circuit = "inner"', "has no circuit", ": circuit]"),
     (RING + 'device = "ring"', "", "recipe.toml"),
+    (RING + 'family = "closed_paths"', "closed paths are for coils", ": family]"),
+    ('device = "stator_1.6x5.5"\nfamily = "closed_paths"', "name one of inner, outer", ": circuit]"),
     ("samples = 3", "samples", ": samples]"),
     # Samples
     ("[samples]", "file", ": samples.file]"),
