@@ -93,12 +93,15 @@ def _recipe(options: Namespace) -> Recipe | str | Path:
     if not is_recipe:
         return Recipe(geometry=load_geometry(target), **choices)
     recipe = Path(target) if is_path(target, ".toml") else target
-    given = {key: value for key, value in choices.items() if value}
+    given: dict[str, Any] = {key: value for key, value in choices.items() if value}
     if not given:
         return recipe
     from magfem.fitting import load_recipe
 
-    return replace(load_recipe(recipe), options={}, **given)
+    loaded = load_recipe(recipe)
+    if options.family and options.family != loaded.suiting_family:  # options are those of the recipe's own family
+        given["options"] = {}
+    return replace(loaded, **given)
 
 
 def _is_samples(target: str) -> bool:

@@ -14,12 +14,12 @@ from magfem.fields.region import Everywhere
 from magfem.fields.terms import Terms
 from magfem.fields.terms_json import terms_to_list
 from magfem.fitting.candidate import Candidate
-from magfem.fitting.families import dissertation_families, members, suitable_families
+from magfem.fitting.families import dissertation_families, family_of, members, suitable_families
 from magfem.fitting.least_squares import solve_least_squares
 from magfem.fitting.measured_fit import fit_samples
 from magfem.fitting.model import FieldModel
 from magfem.fitting.provenance import provenance_of
-from magfem.fitting.recipe import SEARCH, Recipe
+from magfem.fitting.recipe import SEARCH, Recipe, check_for_fields
 from magfem.fitting.sampling import LayeredData, layer_errors, sample, worst_places
 from magfem.fitting.selection import Fitted, choose, climb
 from magfem.geometry import Geometry
@@ -38,7 +38,8 @@ def fit(source: Field | Samples, recipe: Recipe | None = None) -> FieldModel:
     bring its device as `source.geometry`, or the recipe must name one.
     The order is the smallest whose errors stay below half the targets on points of their own, with a
     condition number up to 1e7. Raises InputError for a source without a device, for a coil of several circuits of which
-    the recipe names none, and for a field that is not finite or vanishes.
+    the recipe names none, for a family of samples, for fewer parameters than any candidate has, and for a field that is
+    not finite or vanishes.
     """
     if not isinstance(recipe, Recipe | None):
         raise InputError("fit takes a Recipe: magfem.fitting.load_recipe reads one from a file")
@@ -48,6 +49,7 @@ def fit(source: Field | Samples, recipe: Recipe | None = None) -> FieldModel:
 
 def _fit_field(source: Field, recipe: Recipe) -> FieldModel:
     geometry = _device(source, recipe)
+    check_for_fields(recipe)
     recipe = recipe.of(geometry)
     field = _circuit(source, recipe)
     region = recipe.region
@@ -56,14 +58,17 @@ def _fit_field(source: Field, recipe: Recipe) -> FieldModel:
     log.info("field: %d sample points", sum(len(one.flat) for one in data.values()))
     tried: list[Fitted] = []
     most = recipe.most_parameters
-    for family in suitable_families(geometry) if recipe.family == SEARCH else [recipe.family]:
-        assert family is not None
+    families = suitable_families(geometry) if recipe.family == SEARCH else [str(recipe.family)]
+    for family in families:
         candidates = members(family, geometry, region, recipe.family_options(family))
         found = climb(candidates, data, recipe.objective, recipe.targets, most)
         tried += found
         if found and found[-1].score(recipe.targets) <= 0.5:  # what is larger need not be looked at any more
             most = found[-1].candidate.parameters - 1
-    chosen = choose(tried, recipe.targets)
+    if not tried:
+        raise _nothing_to_try(families, geometry, recipe)
+    suiting = family_of(geometry)
+    chosen = choose(tried, recipe.targets, None if suiting in families else suiting)
     terms = chosen.terms
     terms.check_sources()
     jets = {name: terms.jet(one.flat, 1) for name, one in data.items()}
@@ -102,6 +107,26 @@ def _fit_field(source: Field, recipe: Recipe) -> FieldModel:
         },
         provenance=provenance_of(source, geometry, _circuit_name(field)),
         unit=field.unit,
+    )
+
+
+def _nothing_to_try(families: list[str], geometry: Geometry, recipe: Recipe) -> InputError:
+    """Why no candidate was looked at: all have more parameters than the recipe allows, or there are none."""
+    region = recipe.region or geometry.region
+    sizes = [
+        member.parameters
+        for family in families
+        for member in members(family, geometry, region, recipe.family_options(family))
+    ]
+    of = f"the {'family' if len(families) == 1 else 'families'} {', '.join(families)}"
+    if not sizes:
+        return InputError(
+            f"{geometry.name}: no model of {of} is small enough in the region {region.describe()}; "
+            "a larger clearance takes fewer sources"
+        )
+    return InputError(
+        f"no model of {of} has at most {recipe.most_parameters} parameters, as most_parameters asks; "
+        f"the smallest has {min(sizes)}"
     )
 
 

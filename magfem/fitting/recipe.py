@@ -2,20 +2,30 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from magfem.errors import InputError
-from magfem.fields.region import Shell
+from magfem.fields.region import Region, Shell
 from magfem.fitting.alignment import alignment_of
-from magfem.fitting.families import FAMILIES, SAMPLE_FAMILIES, check_options, family_of, members
+from magfem.fitting.families import (
+    FAMILIES,
+    SAMPLE_FAMILIES,
+    check_options,
+    family_of,
+    members,
+    suitable_families,
+)
+from magfem.fitting.families.options import is_number, is_whole, shown
 from magfem.fitting.least_squares import Ridge
 from magfem.fitting.measurement import Loss, Weighting
 from magfem.fitting.objective import Objective
 from magfem.geometry import Coil, Geometry
+from magfem.geometry.limits import InvalidValue
 from magfem.samples.single_components import Measurement
 
 SEARCH, DEVICE = "search", "device"
@@ -80,16 +90,36 @@ class Recipe:
     def __post_init__(self) -> None:
         for key in _RULES:
             if complaint := complaint_about(key, getattr(self, key)):
-                raise InputError(f"{complaint}, got {getattr(self, key)!r}")
-        if self.circuit is not None and self.geometry is not None:
-            _check_circuit(self.geometry, self.circuit)
+                raise InputError(f"{complaint}, got {shown(getattr(self, key))}")
         alignment_of(self.free, 1.0)
-        if self.options and self.family not in (SEARCH, DEVICE):
-            suiting = family_of(self.geometry) if self.geometry else "interior_harmonics"
-            check_options(self.family or suiting, self.options)
-        if self.family in FAMILIES and self.geometry:
-            region = self.region or self.geometry.region
-            next(members(self.family, self.geometry, region, self.family_options(self.family)))
+        for family in self._families if self.options else []:
+            check_options(family, self.options)
+        for key, circuit in (("terms.circuit", self.options.get("circuit")), ("circuit", self.circuit)):
+            if circuit is not None and self.geometry is not None:
+                _check_circuit(self.geometry, circuit, key)
+        region = self.region or (self.geometry.region if self.geometry else None)
+        check_readings(self.measurements)
+        if region:
+            check_places(self.measurements, region)
+        if self.family in FAMILIES and self.geometry and region:
+            options = self.family_options(self.family)
+            if next(members(self.family, self.geometry, region, options), None) is None:
+                raise InputError(
+                    f"{self.geometry.name}: no model of the family {self.family} is small enough in the region "
+                    f"{region.describe()}; a larger clearance takes fewer sources"
+                )
+
+    @property
+    def _families(self) -> list[str]:
+        """What the recipe's options are for."""
+        if self.family == SEARCH:
+            return suitable_families(self.geometry) if self.geometry else list(SAMPLE_FAMILIES)
+        return [self.suiting_family]
+
+    @property
+    def suiting_family(self) -> str:
+        """The family that the recipe names, else what suits its device or its lack of one."""
+        return self.family or (family_of(self.geometry) if self.geometry else "interior_harmonics")
 
     @property
     def targets(self) -> dict[str, float]:
@@ -112,37 +142,76 @@ class Recipe:
 
 
 _RULES: dict[str, tuple[Callable[[Any], bool], str]] = {
+    "geometry": (
+        lambda value: value is None or isinstance(value, Geometry),
+        "geometry must be a device, such as magfem.load_geometry reads",
+    ),
     "family": (
-        lambda value: value in (None, SEARCH, DEVICE) or value in FAMILIES or value in SAMPLE_FAMILIES,
+        lambda value: value is None or _is_one_of(value, SEARCH, DEVICE, *FAMILIES, *SAMPLE_FAMILIES),
         f"unknown family; known: {SEARCH}, {', '.join(FAMILIES)}; for samples {DEVICE}, {', '.join(SAMPLE_FAMILIES)}",
     ),
-    "target_B": (lambda value: value is None or 0 < value < 1, "target_B must be a relative error between 0 and 1"),
-    "target_gradient": (
-        lambda value: value is None or 0 < value < 1,
-        "target_gradient must be a relative error between 0 and 1",
-    ),
+    "options": (lambda value: _is_named(value), "options must be a dict of the family's options by name"),
+    "region": (lambda value: value is None or isinstance(value, Shell), "region must be a Shell about the device"),
+    "circuit": (lambda value: value is None or _is_text(value), "circuit must be the name of a circuit"),
+    "target_B": (lambda value: _is_target(value), "target_B must be a relative error between 0 and 1"),
+    "target_gradient": (lambda value: _is_target(value), "target_gradient must be a relative error between 0 and 1"),
     "objective": (
-        lambda value: value in ("layers", "absolute", "relative"),
+        lambda value: _is_one_of(value, "layers", "absolute", "relative"),
         'objective must be "layers", "absolute" or "relative"',
     ),
+    "most_parameters": (
+        lambda value: value is None or is_whole(value, 1),
+        "most_parameters must be a whole number, 1 or more",
+    ),
+    "seed": (lambda value: is_whole(value, 0), "seed must be a whole number, 0 or more"),
+    "dimension": (lambda value: value is None or is_whole(value, 2, 3), "dimension must be 2 or 3"),
+    "resolution": (lambda value: is_number(value) and value > 0, "resolution must be positive and finite"),
+    "name": (lambda value: value is None or _is_text(value), "name must be a text, not blank"),
+    "source": (lambda value: isinstance(value, str), "source must be a text"),
     "weighting": (
-        lambda value: value in (None, "sigma", "absolute", "relative"),
+        lambda value: value is None or _is_one_of(value, "sigma", "absolute", "relative"),
         'weighting must be "sigma", "absolute" or "relative"',
     ),
     "ridge": (
-        lambda value: value in (None, "none", "evidence", "leave-one-out"),
+        lambda value: value is None or _is_one_of(value, "none", "evidence", "leave-one-out"),
         'ridge must be "none", "evidence" or "leave-one-out"',
     ),
-    "loss": (lambda value: value in ("squares", "huber"), 'loss must be "squares" or "huber"'),
-    "heldout": (lambda value: value in (None, "samples", "regions"), 'heldout must be "samples" or "regions"'),
-    "most_parameters": (
-        lambda value: value is None or (value >= 1 and value == int(value)),
-        "most_parameters must be a whole number, 1 or more",
+    "loss": (lambda value: _is_one_of(value, "squares", "huber"), 'loss must be "squares" or "huber"'),
+    "heldout": (
+        lambda value: value is None or _is_one_of(value, "samples", "regions"),
+        'heldout must be "samples" or "regions"',
     ),
-    "seed": (lambda value: 0 <= value < math.inf and value == int(value), "seed must be a whole number, 0 or more"),
-    "dimension": (lambda value: value in (None, 2, 3), "dimension must be 2 or 3"),
-    "resolution": (lambda value: 0 < value < math.inf, "resolution must be positive and finite"),
+    "background": (lambda value: isinstance(value, bool), "background must be true or false"),
+    "free": (
+        lambda value: _is_named(value) and all(one is None or _is_pair(one) for one in value.values()),
+        "free must be a dict of two bounds, or None for sensible ones, by a parameter's name",
+    ),
+    "samples": (lambda value: value is None or isinstance(value, SamplesFile), "samples must be a SamplesFile"),
+    "measurements": (
+        lambda value: isinstance(value, tuple | list) and all(isinstance(one, Measurement) for one in value),
+        "measurements must be a tuple of Measurement",
+    ),
 }
+
+
+def _is_one_of(value: Any, *texts: str) -> bool:
+    return isinstance(value, str) and value in texts
+
+
+def _is_text(value: Any) -> bool:
+    return isinstance(value, str) and bool(value.strip())
+
+
+def _is_named(value: Any) -> bool:
+    return isinstance(value, Mapping) and all(isinstance(name, str) for name in value)
+
+
+def _is_pair(value: Any) -> bool:
+    return isinstance(value, tuple | list | np.ndarray) and len(value) == 2 and all(map(is_number, value))
+
+
+def _is_target(value: Any) -> bool:
+    return value is None or (is_number(value) and 0 < value < 1)
 
 
 def complaint_about(key: str, value: Any) -> str:
@@ -153,8 +222,39 @@ def complaint_about(key: str, value: Any) -> str:
     return "" if holds(value) else sentence
 
 
-def _check_circuit(geometry: Geometry, name: str) -> None:
+def check_for_fields(recipe: Recipe) -> None:
+    """Raise InputError when the recipe's family describes measured samples, not the field of a device."""
+    if recipe.family == DEVICE or recipe.family in SAMPLE_FAMILIES:
+        raise InvalidValue(
+            f"the family {recipe.family} is for measured samples: name their file, or one of {', '.join(FAMILIES)}",
+            "family",
+        )
+
+
+def check_readings(measurements: Sequence[Measurement]) -> None:
+    """Raise InvalidValue where nothing says how sure the factor of single readings is (`scaling.scale_to`)."""
+    for number, one in enumerate(measurements):
+        key = f"measurement[{number}].uncertainty"
+        if one.uncertainty is None and len(measurements) == 1:
+            raise InvalidValue("a scale from a single measurement needs its uncertainty", key)
+        if one.uncertainty is None and one.value == 0:
+            raise InvalidValue("a measurement of zero needs an uncertainty: it cannot be weighed by its size", key)
+
+
+def check_places(measurements: Sequence[Measurement], region: Region) -> None:
+    """Raise InvalidValue for single readings outside the region that the model holds in."""
+    for number, one in enumerate(measurements):
+        if not region.contains(one.position):
+            x, y, z = 1e3 * one.position
+            raise InvalidValue(
+                f"the measurement at ({x:.4g}, {y:.4g}, {z:.4g}) mm lies outside the model's region, "
+                f"{region.describe()}",
+                f"measurement[{number}].position",
+            )
+
+
+def _check_circuit(geometry: Geometry, name: str, key: str) -> None:
     known = [circuit.name for circuit in geometry.circuits] if isinstance(geometry, Coil) else []
     if name not in known:
         has = f"it has {', '.join(known)}" if known else "it is no coil"
-        raise InputError(f"{geometry.name} has no circuit {name!r}; {has}")
+        raise InvalidValue(f"{geometry.name} has no circuit {name!r}; {has}", key)

@@ -8,13 +8,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from magfem.errors import InputError
+from magfem.errors import CardError, InputError
 from magfem.fields.region import Shell
 from magfem.fitting.alignment import ANGLES, LENGTHS, alignment_of
+from magfem.fitting.families.options import OPTIONS
 from magfem.fitting.recipe import Recipe, SamplesFile, complaint_about
 from magfem.geometry import load_geometry
 from magfem.geometry.card import Table, read_table
 from magfem.geometry.catalogue import resolve, short_path
+from magfem.geometry.vectors import three_lengths
 from magfem.samples.single_components import measurements_from_table
 from magfem.units import describe
 
@@ -71,7 +73,7 @@ def load_recipe(name_or_path: str | Path) -> Recipe:
             part.only(*keys)
             values |= {target: _value(part, key, target) for key, target in keys.items() if key in part}
     if "terms" in table:
-        values["options"] = dict(table.table("terms").values)
+        values["options"] = _options(table.table("terms"))
     if "region" in table:
         if "geometry" not in values:
             raise table.error("a region is counted from a device: name one", "region")
@@ -82,11 +84,12 @@ def load_recipe(name_or_path: str | Path) -> Recipe:
         values["free"] = _free(table.table("free"))
     values["measurements"] = measurements_from_table(table)
     try:
-        return Recipe(**values)
-    except InputError as error:
-        words = {"option": "terms", "term": "terms", "family": "family", "circuit": "circuit"}
-        key = next((key for word, key in words.items() if word in str(error)), "")
-        raise table.error(str(error), key if key in table else "") from None
+        with table.locating():
+            return Recipe(**values)
+    except CardError:
+        raise
+    except InputError as error:  # the family is not one for this device
+        raise table.error(str(error), "family" if "family" in table else "") from None
 
 
 def _value(table: Table, key: str, target: str) -> Any:
@@ -100,6 +103,15 @@ def _value(table: Table, key: str, target: str) -> Any:
     if complaint := complaint_about(target, value):
         raise table.error(complaint, key)
     return int(value) if target in _WHOLE else value
+
+
+def _options(table: Table) -> dict[str, Any]:
+    """Options of a family in SI units: lengths are texts with their unit, all else is as it stands."""
+    options = dict(table.values)
+    for key in options:
+        if key in OPTIONS and OPTIONS[key].length:
+            options[key] = three_lengths(table, key) if key == "centre" else table.quantity(key, "length")
+    return options
 
 
 def _region(table: Table, device: Shell) -> Shell:

@@ -70,27 +70,33 @@ def climb(
     return tried
 
 
-def choose(tried: list[Fitted], targets: dict[str, float]) -> Fitted:
-    """The first candidate below half the targets, else the best; says so when that misses them.
+def choose(tried: list[Fitted], targets: dict[str, float], suiting: str | None = None) -> Fitted:
+    """The first candidate below half the targets, else the best of those tried, one or more; says when that misses.
 
+    suiting: the family that suits the device, where it was not among those tried; None where a larger clearance is
+    what would help.
     Raises ConvergenceError when even the best is no model: its error of B is above 100 %.
     """
-    if not tried:
-        raise ConvergenceError(
-            f"no model of this device has a condition number up to {CONDITION:.0e}: its terms are too alike"
-        )
     good = [one for one in tried if one.score(targets) <= 0.5]
     chosen = min(good, key=lambda one: one.candidate.parameters) if good else min(tried, key=lambda o: o.score(targets))
     B, gradient = (chosen.selection[key]["max"] for key in ("B", "gradient"))
+    family = chosen.candidate.family
     if not B < 1:
         raise ConvergenceError(
-            f"no model of the family {chosen.candidate.family} describes this field: the best of {len(tried)} errs by "
-            f"{B:.1e} in B; a larger clearance in the card's region is what helps"
+            f"no model of the family {family} describes this field: the best of {len(tried)} errs by {B:.1e} in B; "
+            + (
+                f"its options, or the family itself, do not suit: {suiting} is what suits this device"
+                if suiting
+                else "a larger clearance in the card's region is what helps"
+            )
         )
     if chosen.score(targets) > 1:
         log.warning(
             "the targets are missed: %.1e in B (wanted %.1e), %.1e in the gradient (wanted %.1e); "
-            "the stated bound says how good the model is, a larger clearance makes it better",
+            "the stated bound says how good the model is, %s",
             *(B, targets["B"], gradient, targets["gradient"]),
+            f"{family} with these options describes the field no better: {suiting} is what suits this device"
+            if suiting
+            else "a larger clearance makes it better",
         )
     return chosen

@@ -53,14 +53,14 @@ offsets = "0.2 mm"
 gain = [0.9, 1.1]
 
 [[measurement]]
-position = ["10 mm", "0 mm", "0 mm"]
+position = ["2 mm", "0 mm", "3 mm"]
 direction = [2, 0, 0]
 value = "411 uT"
 uncertainty = "0.5 uT"
 source = "6.1.2"
 
 [[measurement]]
-position = ["20 mm", "0 mm", "0 mm"]
+position = ["0 mm", "-1 mm", "4 mm"]
 direction = [0, -3, 4]
 value = "55 uT"
 source = "6.1.2"
@@ -106,7 +106,7 @@ def test_every_key_sets_what_it_says(tmp_path: Path) -> None:
     assert recipe.free["offsets"] == pytest.approx((-2e-4, 2e-4))
     assert recipe.free["gain"] == (0.9, 1.1)
     first, second = recipe.measurements
-    assert first.position == pytest.approx([10e-3, 0, 0]) and first.direction.tolist() == [1, 0, 0]
+    assert first.position == pytest.approx([2e-3, 0, 3e-3]) and first.direction.tolist() == [1, 0, 0]
     assert (first.value, first.uncertainty, first.source) == (pytest.approx(411e-6), pytest.approx(0.5e-6), "6.1.2")
     assert second.direction == pytest.approx([0, -0.6, 0.8]) and second.uncertainty is None
 
@@ -142,6 +142,8 @@ FAULTS = [
     (RING + 'family = "splines"', "unknown family", ": family]"),
     (RING + 'circuit = "inner"', "has no circuit", ": circuit]"),
     (RING + 'device = "ring"', "", "recipe.toml"),
+    (RING + 'family = "closed_paths"', "closed paths are for coils", ": family]"),
+    ('device = "stator_1.6x5.5"\nfamily = "closed_paths"', "name one of inner, outer", ": circuit]"),
     ("samples = 3", "samples", ": samples]"),
     # Samples
     ("[samples]", "file", ": samples.file]"),
@@ -166,7 +168,7 @@ FAULTS = [
     (RING + "fit = 3", "fit", ": fit]"),
     (RING + "[target]\nB = 2", "target_B must be", ": target.B]"),
     (RING + "[solve]\ndimension = 4", "dimension must be 2 or 3", ": solve.dimension]"),
-    (RING + "[terms]\nknots = 3\n", "has no option 'knots'", ": terms]"),
+    (RING + "[terms]\nknots = 3\n", "has no option 'knots'", ": terms.knots]"),
     # What is free
     (RING + "free = true", "free", ": free]"),
     (RING + "[free]\nroll = true", "unknown free parameter 'roll'", ": free.roll]"),

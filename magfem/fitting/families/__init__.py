@@ -11,7 +11,6 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any, TypeAlias
 
-from magfem.errors import InputError
 from magfem.fields.region import Shell
 from magfem.fitting.candidate import Candidate, Displaceable
 from magfem.fitting.families.charged_faces import charged_faces
@@ -21,9 +20,11 @@ from magfem.fitting.families.free import exterior_harmonics, interior_harmonics
 from magfem.fitting.families.harmonics import solid_harmonics
 from magfem.fitting.families.multipoles import axial_multipole, displaced_multipoles, eight_source
 from magfem.fitting.families.oblate import oblate_discs
+from magfem.fitting.families.options import OPTIONS, shown
 from magfem.fitting.families.tubes import cylinder_of, tubes_of
 from magfem.geometry import Coil, Geometry
 from magfem.geometry.circuit import CoaxialWinding
+from magfem.geometry.limits import InvalidValue
 from magfem.samples import Samples
 
 Member: TypeAlias = Candidate | Displaceable
@@ -50,26 +51,31 @@ SAMPLE_FAMILIES: dict[str, Callable[..., Iterator[Candidate]]] = {
 
 
 def sample_members(family: str, samples: Samples, options: Mapping[str, Any]) -> Iterator[Candidate]:
-    """The candidates of a family of `SAMPLE_FAMILIES`. Raises InputError for options that it does not have."""
+    """The candidates of a family of `SAMPLE_FAMILIES`. Raises InvalidValue as `check_options` does."""
     check_options(family, options)
     return SAMPLE_FAMILIES[family](samples, **options)
 
 
 def members(family: str, geometry: Geometry, region: Shell, options: Mapping[str, Any]) -> Iterator[Member]:
-    """The candidates of a family. Raises InputError for options that it does not have."""
+    """The candidates of a family. Raises InvalidValue as `check_options` does."""
     check_options(family, options)
     return FAMILIES[family](geometry, region, **options)
 
 
 def check_options(family: str, options: Mapping[str, Any]) -> None:
-    """Raise InputError for options that a family does not have."""
-    make = FAMILIES[family] if family in FAMILIES else SAMPLE_FAMILIES[family]
-    given = ("geometry", "region", "window", "samples")
-    known = [name for name in inspect.signature(make).parameters if name not in given]
-    for name in options:
+    """Raise InvalidValue, with the key of recipe files, for options that a family does not have or that cannot be."""
+    make = FAMILIES.get(family) or SAMPLE_FAMILIES.get(family)
+    parameters = inspect.signature(make).parameters if make else {}
+    known = [name for name in parameters if name not in ("geometry", "region", "window", "samples")]
+    for name, value in options.items():
+        key = f"terms.{name}"
         if name not in known:
             has = f"it has {', '.join(known)}" if known else "it has none"
-            raise InputError(f"the family {family} has no option {name!r}; {has}")
+            raise InvalidValue(f"the family {family} has no option {name!r}; {has}", key)
+        if value is None and parameters[name].default is None:
+            continue
+        if not OPTIONS[name].holds(value):
+            raise InvalidValue(f"{OPTIONS[name].sentence}, got {shown(value)}", key)
 
 
 def family_of(geometry: Geometry) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -10,20 +10,25 @@ from magfem.errors import InputError
 from magfem.fields.region import Shell
 from magfem.fields.terms import Terms, charge_discs, concatenate
 from magfem.fitting.candidate import Candidate
+from magfem.fitting.families.options import several
 from magfem.fitting.families.tubes import tubes_of
 from magfem.geometry import Geometry
 
 
-def charged_faces(geometry: Geometry, region: Shell, rings: tuple[int, ...] = (1, 2, 3, 4, 6)) -> Iterator[Candidate]:
+def charged_faces(
+    geometry: Geometry, region: Shell, rings: Sequence[int] | int = (1, 2, 3, 4, 6)
+) -> Iterator[Candidate]:
     """Opposite discs on the two faces of every tube: at both rims, then at 2, 3, … further radii between them.
 
     A rigid magnet is met exactly by the first candidate; the reaction of a recoil permeability above 1 spreads charge
     over faces and walls, which the further discs follow only as far as the faces go.
+
+    rings: how many radial steps from rim to rim, or several to try.
     """
     tubes = tubes_of(geometry)
     if not (tubes and geometry.axisymmetric):
         raise InputError(f"{geometry.name}: charged faces need axial magnetisation of coaxial rings or cylinders")
-    for count in rings:
+    for count in several(rings):
         parts: list[Terms] = []
         parameter: list[int] = []
         for tube in tubes:

@@ -14,6 +14,7 @@ from magfem.fitting.candidate import Candidate
 from magfem.fitting.families.tubes import gauss
 from magfem.geometry import Coil, Geometry
 from magfem.geometry.circuit import Circuit, CoaxialWinding, FoilTrack, Stations, SweptWinding
+from magfem.geometry.limits import InvalidValue
 from magfem.typing import Floats
 
 MOST_NODES = 40_000
@@ -81,7 +82,7 @@ def _circuit(geometry: Geometry, name: str | None) -> tuple[Coil, Circuit]:
         if circuit.name == name or (name is None and len(geometry.circuits) == 1):
             return geometry, circuit
     names = ", ".join(circuit.name for circuit in geometry.circuits)
-    raise InputError(f"{geometry.name} has {len(geometry.circuits)} circuits: name one of {names}")
+    raise InvalidValue(f"{geometry.name} has {len(geometry.circuits)} circuits: name one of {names}", "circuit")
 
 
 def _nodes(stations: Stations, across: Floats | float) -> Floats:

@@ -11,10 +11,9 @@ from magfem.fields.term_kinds import HARMONIC, INTERIOR
 from magfem.fields.terms import Terms, harmonics
 from magfem.fitting.candidate import Candidate, independent
 from magfem.fitting.families.harmonics import all_orders
+from magfem.fitting.families.options import SYMMETRIES, several
 from magfem.samples import Samples
 from magfem.typing import ArrayLike, Floats
-
-SYMMETRIES = ("none", "axial", "diametric", "plane_x", "plane_y", "plane_z")
 
 
 def interior_harmonics(
@@ -30,7 +29,7 @@ def interior_harmonics(
     """
     middle = ball_about(samples)[0] if centre is None else np.asarray(centre, dtype=float)
     radius = float(np.linalg.norm(samples.points - middle, axis=1).max())
-    for top in (degrees,) if isinstance(degrees, int) else degrees:
+    for top in several(degrees):
         terms = selected(symmetry, range(1, top + 1), radius, middle, INTERIOR)
         yield independent("interior_harmonics", f"interior harmonics up to degree {top}", terms)
 
@@ -49,7 +48,7 @@ def exterior_harmonics(
     middle = np.asarray(centre, dtype=float)
     distance = np.linalg.norm(samples.points - middle, axis=1)
     reference = float(distance[distance > 0].min()) if radius is None else radius
-    for top in (degrees,) if isinstance(degrees, int) else degrees:
+    for top in several(degrees):
         terms = selected(symmetry, range(1, top + 1), reference, middle, HARMONIC)
         yield independent("exterior_harmonics", f"exterior harmonics up to degree {top}", terms)
 

@@ -7,12 +7,13 @@ from itertools import product
 
 import numpy as np
 
-from magfem.errors import InputError
 from magfem.fields.region import Region, Shell
 from magfem.fields.terms import Terms, concatenate, frame_about, harmonics
 from magfem.fitting.candidate import Candidate, Displaceable, independent
+from magfem.fitting.families.options import several
 from magfem.fitting.families.tubes import magnetisation_of, the_cylinder
 from magfem.geometry import Geometry
+from magfem.geometry.limits import InvalidValue
 from magfem.typing import Floats
 
 SPACING = 0.02
@@ -52,7 +53,7 @@ def displaced_multipoles(
     size = max(hull.length, hull.diameter / 2)
     top, bottom = hull.length / 2 - 0.25 * region.clearance, -hull.length / 2 - 2 * size
     least = SPACING * size
-    for count, order in product(_several(sources), _several(orders)):
+    for count, order in product(several(sources), several(orders)):
 
         def make(places: Floats, count: int = count, order: int = order) -> Candidate:
             heights = top - np.cumsum(places)
@@ -84,7 +85,7 @@ def displaced_multipoles(
 
 
 def eight_source(
-    geometry: Geometry, region: Shell, sets: int = 3, orders: Sequence[int] = (1, 3, 5)
+    geometry: Geometry, region: Shell, sets: int = 3, orders: Sequence[int] | int = (1, 3, 5)
 ) -> Iterator[Candidate]:
     """Symmetric sets of eight axial multipoles (6.1–6.3), odd orders about the magnetisation.
 
@@ -92,8 +93,12 @@ def eight_source(
     the sets stand at the middles of equal slices of the half length, at a quarter of the diameter from the axis.
     Orders must be odd: even ones of a symmetric set vanish.
     """
+    orders = several(orders)
     if any(order % 2 == 0 for order in orders):
-        raise InputError(f"{geometry.name}: eight symmetric sources have odd orders only, got {list(orders)}")
+        raise InvalidValue(
+            f"{geometry.name}: eight symmetric sources have odd orders only, got {', '.join(map(str, orders))}",
+            "terms.orders",
+        )
     hull = the_cylinder(geometry)
     frame = frame_about(magnetisation_of(geometry))
     aside = hull.diameter / 4 / np.sqrt(2)
@@ -121,7 +126,3 @@ def _axial(geometry: Geometry, height: float, degrees: range) -> Terms:
     zeros, cosine = [0] * len(degrees), [False] * len(degrees)
     centre = height * frame[:, 2]
     return harmonics(geometry.hull.radius, list(degrees), zeros, cosine, np.ones(len(degrees)), centre, frame)
-
-
-def _several(numbers: Sequence[int] | int) -> Sequence[int]:
-    return (numbers,) if isinstance(numbers, int) else numbers

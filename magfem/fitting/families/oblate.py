@@ -11,6 +11,7 @@ from magfem.fields.region import Shell
 from magfem.fields.term_kinds import OBLATE
 from magfem.fields.terms import concatenate, harmonics
 from magfem.fitting.candidate import Candidate, Displaceable, independent
+from magfem.fitting.families.options import several
 from magfem.fitting.families.tubes import gauss, the_cylinder
 from magfem.geometry import Geometry
 from magfem.typing import Floats
@@ -30,8 +31,8 @@ def oblate_discs(
     if not geometry.axisymmetric:
         raise InputError(f"{geometry.name}: oblate sources need a device of revolution about z")
     hull = the_cylinder(geometry)
-    for count in (discs,) if isinstance(discs, int) else discs:
-        for top in (degrees,) if isinstance(degrees, int) else degrees:
+    for count in several(discs):
+        for top in several(degrees):
 
             def make(places: Floats, count: int = count, top: int = top) -> Candidate:
                 radius = float(places[0])
