@@ -15,8 +15,8 @@ from magfem.fitting.families import FAMILIES, SAMPLE_FAMILIES, check_options, fa
 from magfem.fitting.least_squares import Ridge
 from magfem.fitting.measurement import Loss, Weighting
 from magfem.fitting.objective import Objective
+from magfem.fitting.readings import Reading
 from magfem.geometry import Coil, Geometry
-from magfem.samples.single_components import Measurement
 
 SEARCH, DEVICE = "search", "device"
 """Instead of a family's name: all families that describe the device; for samples, the device's own field, scaled."""
@@ -75,7 +75,7 @@ class Recipe:
     background: bool = False
     free: Mapping[str, tuple[float, float] | None] = field(default_factory=dict)
     samples: SamplesFile | None = None
-    measurements: tuple[Measurement, ...] = ()
+    measurements: tuple[Reading, ...] = ()
 
     def __post_init__(self) -> None:
         for key in _RULES:

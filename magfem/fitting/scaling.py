@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 
 from magfem.errors import InputError
 from magfem.fitting.model import FieldModel
-from magfem.samples.single_components import Measurement
+from magfem.fitting.readings import Reading
 from magfem.typing import Floats
 
 
@@ -41,7 +41,7 @@ class Scale:
         }
 
 
-def scale_to(model: FieldModel, measurements: Sequence[Measurement]) -> Scale:
+def scale_to(model: FieldModel, measurements: Sequence[Reading]) -> Scale:
     """The factor that single components agree on best.
 
     Each implies a factor with the deviation of its reading. Where they disagree by more than that, distances or

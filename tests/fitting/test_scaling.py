@@ -9,9 +9,9 @@ import pytest
 
 import magfem
 from magfem.errors import InputError, OutsideRegionError
+from magfem.fitting.readings import Reading
 from magfem.fitting.scaling import scale_to, scaled
 from magfem.geometry import CylinderMagnet
-from magfem.samples.single_components import Measurement
 
 ALONG = np.array([1.0, 0.0, 0.0])
 DISTANCES = (10e-3, 20e-3, 30e-3, 40e-3)
@@ -20,8 +20,8 @@ UNCERTAINTY = 0.5e-6
 IMPLIED = (1.14, 1.21, 1.33, 1.22)  # T, the remanence that each asks for
 
 
-def reading(x: float, value: float, uncertainty: float | None = UNCERTAINTY, direction=ALONG) -> Measurement:
-    return Measurement(np.array([x, 0.0, 0.0]), np.asarray(direction, dtype=float), value, uncertainty, "a test")
+def reading(x: float, value: float, uncertainty: float | None = UNCERTAINTY, direction=ALONG) -> Reading:
+    return Reading(np.array([x, 0.0, 0.0]), np.asarray(direction, dtype=float), value, uncertainty, "a test")
 
 
 def test_each_reading_of_the_rotor_implies_a_remanence() -> None:
@@ -81,7 +81,7 @@ def test_exact_readings_give_the_exact_factor(rotor_model) -> None:
     for uncertainty in (1e-6, None):
         scale = scale_to(
             rotor_model,
-            [Measurement(*one, uncertainty, "") for one in zip(points, directions, values.tolist(), strict=True)],
+            [Reading(*one, uncertainty, "") for one in zip(points, directions, values.tolist(), strict=True)],
         )
         assert scale.factor == pytest.approx(1.07, rel=1e-12)
         np.testing.assert_allclose(scale.implied, 1.07, rtol=1e-10)

@@ -1,4 +1,4 @@
-"""Single measured components of B, one by one: the `[[measurement]]` tables of recipes."""
+"""Readings, single measured components of B, one by one: the `[[measurement]]` tables of recipes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from magfem.units import describe
 
 
 @dataclass(frozen=True, eq=False)
-class Measurement:
+class Reading:
     """One component of B, measured at one place in the device's frame."""
 
     position: Floats  # (3,) m
@@ -22,23 +22,12 @@ class Measurement:
     source: str
 
 
-def measurements_from_table(table: Table) -> tuple[Measurement, ...]:
-    """The measurements of a recipe, which may have none. Raises CardError."""
-    return tuple(_measurement(entry) for entry in _entries(table, "measurement"))
+def readings_from_table(table: Table) -> tuple[Reading, ...]:
+    """The readings of a recipe, which may have none. Raises CardError."""
+    return tuple(_reading(entry) for entry in table.tables("measurement")) if "measurement" in table else ()
 
 
-def _entries(table: Table, key: str) -> list[Table]:
-    """The tables of an array `[[key]]`, each named `key[0]`, `key[1]`, … in messages."""
-    entries = table.values.get(key, [])
-    if not isinstance(entries, list):
-        raise table.error(f"{key} must be a list of tables, [[{key}]], got {describe(entries)}", key)
-    for number, entry in enumerate(entries):
-        if not isinstance(entry, dict):
-            raise table.error(f"{key} must be a list of tables, got {describe(entry)} in it", f"{key}[{number}]")
-    return [Table(table.origin, entry, table.dotted(f"{key}[{n}]")) for n, entry in enumerate(entries)]
-
-
-def _measurement(entry: Table) -> Measurement:
+def _reading(entry: Table) -> Reading:
     entry.only("position", "direction", "value", "uncertainty", "source")
     direction = np.array([_number(entry, "direction", part) for part in _three(entry, "direction")])
     if not 0 < np.linalg.norm(direction) < np.inf:
@@ -46,7 +35,7 @@ def _measurement(entry: Table) -> Measurement:
     uncertainty = entry.quantity("uncertainty", "flux density") if "uncertainty" in entry else None
     if uncertainty is not None and uncertainty <= 0:
         raise entry.error("uncertainty must be positive", "uncertainty")
-    return Measurement(
+    return Reading(
         position=np.array([_length(entry, part) for part in _three(entry, "position")]),
         direction=direction / np.linalg.norm(direction),
         value=entry.quantity("value", "flux density"),
