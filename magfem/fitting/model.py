@@ -17,11 +17,11 @@ from magfem.fields.region_json import region_from_dict, region_to_dict
 from magfem.fields.terms import Terms
 from magfem.fields.terms_json import number, numbers, terms_from_list, terms_to_list
 from magfem.fields.workspace_region import Ball, Box
-from magfem.files import read_json, write_json
+from magfem.files import not_whole, read_json, write_json
 from magfem.fitting.uncertainty import predictive_deviation
 from magfem.geometry.catalogue import resolve, short_path
 from magfem.typing import ArrayLike, Floats, Integers, Jet, Outside, Points
-from magfem.units import describe, one_line
+from magfem.units import describe
 
 FORMAT, VERSION = "magfem-model", 1
 
@@ -153,14 +153,7 @@ def load_model(name_or_path: str | Path) -> FieldModel:
         if not all(number(data["report"]["bound"][name]) >= 0 for name in ("B", "gradient")):
             raise ValueError("relative errors of B and gradient")
     except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError, InputError) as error:
-        reason = f"{key} is not laid out as in a field model"
-        if isinstance(error, KeyError):
-            reason = f"missing key {error}"
-        elif isinstance(error, InputError):
-            reason = str(error)
-        elif isinstance(error, ValueError):
-            reason = f"expected {error}"
-        raise CardError(f"not a whole field model: {one_line(reason)}", f"{shown}: {key}") from None
+        raise not_whole("field model", error, shown, key) from None
     return FieldModel(
         name=data["name"],
         lowered=lowered,
