@@ -137,7 +137,7 @@ def main() -> None:
             terms, _ = published_ring_fits()[window]
             assert isinstance(model.region, Shell)
             printed = judge(terms, model.region, field)
-            rows.append(row("", "dissertation, as published", terms.coefficient.size, "1e+28", printed))
+            rows.append(row("", "dissertation, as published", terms.coefficient.size, "–", printed))
         drawn.append((label, ours, theirs, printed))
     header = [
         "device, region",

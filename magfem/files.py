@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from magfem.errors import InputError
+from magfem.errors import CardError, InputError
+from magfem.units import one_line
 
 
 def write_bytes(path: Path, content: bytes) -> None:
@@ -45,6 +46,21 @@ def to_json(data: Any) -> str:
     """JSON text of plain data and NumPy arrays; lists of numbers stand on one line."""
     text = json.dumps(data, indent=1, allow_nan=False, ensure_ascii=False, default=_plain)
     return _NUMBERS.sub(lambda found: f"[{_BREAK.sub(' ', found[1])}]", text)
+
+
+def not_whole(what: str, error: Exception, shown: str, key: str) -> CardError:
+    """What to raise for a JSON file that does not hold a whole `what`, from the exception met while reading `key`.
+
+    A ValueError's text says what was expected; `shown` is how messages name the file.
+    """
+    reason = f"{key} is not laid out as in a {what}"
+    if isinstance(error, KeyError):
+        reason = f"missing key {error}"
+    elif isinstance(error, InputError):
+        reason = str(error)
+    elif isinstance(error, ValueError):
+        reason = f"expected {error}"
+    return CardError(f"not a whole {what}: {one_line(reason)}", f"{shown}: {key}" if key else shown)
 
 
 _NUMBERS = re.compile(r"\[\n\s*([-+0-9.eE]+(?:,\n\s*[-+0-9.eE]+)*)\n\s*\]")  # texts hold no line breaks as such

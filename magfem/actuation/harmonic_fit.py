@@ -26,8 +26,10 @@ from magfem.fields.region import Region, Shell
 from magfem.fields.term_kinds import HARMONIC, INTERIOR, PATH
 from magfem.fields.terms import Terms, concatenate, frame_about, harmonics
 from magfem.fields.workspace_region import Ball, Box, bounding_ball
+from magfem.fitting.candidate import Candidate, independent
+from magfem.fitting.families.harmonics import all_orders
 from magfem.fitting.least_squares import solve_least_squares
-from magfem.typing import Booleans, Floats, Integers, Points
+from magfem.typing import Booleans, Floats, Points
 
 _OF_REVOLUTION = ((1, 3), (1, 6), (2, 4), (3, 4), (4, 5), (6, 5), (8, 6), (10, 6))
 _GENERAL = ((1, 2), (1, 4), (1, 6), (3, 4), (5, 4))
@@ -39,6 +41,7 @@ _SPACINGS = (2.5, 1.5, 1.0, 0.7, 0.5)
 _SMOOTH = 12.0  # n d/ρ: of the waviness of a ring's n dipoles, e^{−12} remains
 _MOST_SOURCES, _MOST_PARAMETERS = 800, 600
 
+_FAMILY = "mpem"
 _SEED = 0
 _SAFETY = 1.5  # on the largest error found: other random points may hit a little harder
 _GOOD_ENOUGH = 0.1  # of the tolerance: what is better is not worth more sources
@@ -77,24 +80,6 @@ def _chosen(terms: Terms, which: Booleans) -> Terms | None:
     return concatenate([terms.source(int(k)) for k in rows]) if rows.size else None
 
 
-@dataclass(frozen=True)
-class _Candidate:
-    """Sources to fit: the parameter (c,) behind every coefficient, which multiplies its value in `terms`."""
-
-    terms: Terms
-    parameter: Integers
-
-    def columns(self, points: Points) -> Floats:
-        """B (p, n, 3) of every parameter at one."""
-        columns = np.zeros((int(self.parameter.max()) + 1, len(points), 3))
-        for k in range(self.terms.kind.size):
-            source, first = self.terms.source(k), int(self.terms.start[k])
-            for j, value in enumerate(source.coefficient):
-                unit = source.with_coefficients(value * (np.arange(source.degree.size) == j))
-                columns[self.parameter[first + j]] += unit.jet(points, 0)[0]
-        return columns
-
-
 def _fitted(rest: Terms, terms: Terms, region: Region, tolerance: float) -> HarmonicFit:
     """Harmonics for `rest`, and the errors they leave of `terms`, of which it is a part."""
     rng = np.random.default_rng(_SEED)
@@ -106,10 +91,9 @@ def _fitted(rest: Terms, terms: Terms, region: Region, tolerance: float) -> Harm
     weight = 1 / np.maximum(size, 1e-2 * size.max())
     best: HarmonicFit | None = None
     for candidate in _candidates(rest, region, training):
-        columns = candidate.columns(training) * weight
+        columns = candidate.columns(training, 0)[0] * weight
         solved = solve_least_squares(columns.reshape(len(columns), -1).T, (target * weight).ravel())
-        unit = candidate.terms.coefficient
-        fitted = candidate.terms.with_coefficients(unit * solved.parameters[candidate.parameter])
+        fitted = candidate.with_parameters(solved.parameters)
         found = fitted.jet(judged.reshape(-1, 3), 0)[0].reshape(judged.shape)
         errors = relative_errors(whole + found - wanted, whole)
         tried = HarmonicFit(fitted, _SAFETY * float(errors.max()), float(np.sqrt(np.mean(errors**2))))
@@ -128,7 +112,7 @@ def _points(region: Region, rng: np.random.Generator, layers: int, nearest: int)
     raise InputError(f"harmonics are fitted in a Ball, a Box or a shell about a body, not {region.describe()}")
 
 
-def _candidates(rest: Terms, region: Region, points: Points) -> Iterator[_Candidate]:
+def _candidates(rest: Terms, region: Region, points: Points) -> Iterator[Candidate]:
     """Sets of harmonics to fit, from small to large; none has a centre in the region, of which `points` are many."""
     body = _body(rest)
     frame = frame_about(body.axis)
@@ -142,15 +126,14 @@ def _candidates(rest: Terms, region: Region, points: Points) -> Iterator[_Candid
         parts = [_harmonics(HARMONIC, degree, place, reach, frame, body.revolved) for place in places]
         if inner is not None:
             parts.append(_harmonics(INTERIOR, min(degree, 6), np.array(inner.centre), inner.radius, np.eye(3), False))
-        terms = concatenate(parts)
-        yield _Candidate(terms, np.arange(terms.degree.size))
+        yield independent(_FAMILY, f"{count} centres, degrees up to {degree}", concatenate(parts))
     for spacing in _SPACINGS if away > 0 else ():
         dipoles = _rings(body, frame, spacing * away, away)
-        if dipoles.terms.kind.size <= _MOST_SOURCES and dipoles.parameter.max() < _MOST_PARAMETERS:
+        if dipoles.terms.kind.size <= _MOST_SOURCES and dipoles.parameters <= _MOST_PARAMETERS:
             yield dipoles
 
 
-def _rings(body: _Body, frame: Floats, spacing: float, away: float) -> _Candidate:
+def _rings(body: _Body, frame: Floats, spacing: float, away: float) -> Candidate:
     """Dipoles on rings about the axis that fill a body, with that spacing, seen from as near as `away`."""
     inset = min(0.5 * away, 0.5 * body.radius), min(0.5 * away, 0.5 * body.half)
     width, half = body.radius - inset[0], body.half - inset[1]
@@ -170,19 +153,15 @@ def _rings(body: _Body, frame: Floats, spacing: float, away: float) -> _Candidat
             parts.append(harmonics(away, [1] * free, [0, 1, 1][:free], sine, np.ones(free), centre, axes))
             first = 2 * ring if body.revolved else 3 * len(parts)
             parameter += range(first, first + free)
-    return _Candidate(concatenate(parts), np.unique(parameter, return_inverse=True)[1])
+    index = np.unique(parameter, return_inverse=True)[1]
+    return Candidate(_FAMILY, f"dipoles on {ring + 1} rings", concatenate(parts), index)
 
 
 def _harmonics(kind: int, top: int, centre: Points, radius: float, frame: Floats, revolved: bool) -> Terms:
     """All harmonics up to a degree, of order 0 alone if `revolved`."""
-    index = [
-        (degree, order, part)
-        for degree in range(1, top + 1)
-        for order in range(1 if revolved else degree + 1)
-        for part in (0, 1)[: 1 + (order > 0)]
-    ]
+    index = [one for one in all_orders(range(1, top + 1)) if not revolved or one[1] == 0]
     degree, order, sine = map(list, zip(*index, strict=True))
-    return harmonics(radius, degree, order, [bool(part) for part in sine], np.ones(len(index)), centre, frame, kind)
+    return harmonics(radius, degree, order, sine, np.ones(len(index)), centre, frame, kind)
 
 
 @dataclass(frozen=True)

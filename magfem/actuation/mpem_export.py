@@ -18,12 +18,13 @@ from magfem.actuation.coil_system import CoilSystem
 from magfem.actuation.harmonic_fit import as_harmonics
 from magfem.actuation.mpem import OFFSET
 from magfem.errors import ConvergenceError, InputError
-from magfem.exchange.about import facts
 from magfem.fields.field import Field
 from magfem.fields.region import Region, Shell
+from magfem.fields.region_parts import bounding_box
 from magfem.fields.terms import Terms
 from magfem.fields.workspace_region import Ball, Box
 from magfem.files import write_text
+from magfem.fitting.about import facts
 from magfem.typing import Floats
 from magfem.units import one_line
 
@@ -71,7 +72,7 @@ def write_mpem(
     """
     name, parts, region = _parts(source)
     region = workspace or region
-    box = _box(region)
+    box = _workspace_box(region)
     fits = {label: as_harmonics(terms, region, tolerance) for label, terms in parts.items()}
     worst = max(fits, key=lambda label: fits[label].maximum)
     maximum, rms = fits[worst].maximum, fits[worst].rms
@@ -112,7 +113,7 @@ def _labels(names: list[str]) -> list[str]:
     return names if usual else [f"Coil_{k}" for k in range(len(names))]
 
 
-def _box(region: Region) -> Box:
+def _workspace_box(region: Region) -> Box:
     """The file's workspace."""
     if isinstance(region, Box):
         return region
@@ -121,9 +122,8 @@ def _box(region: Region) -> Box:
         low, high = np.array(region.centre) - half, np.array(region.centre) + half
         return Box(tuple(low.tolist()), tuple(high.tolist()))
     if isinstance(region, Shell):
-        reach = region.hull.radius + region.extent
-        side = min(reach, region.rho[1])
-        return Box((-side, -side, max(-reach, region.z[0])), (side, side, min(reach, region.z[1])))
+        low, high = bounding_box(region)
+        return Box(tuple(low.tolist()), tuple(high.tolist()))
     raise InputError(f"an MPEM file states a workspace: give a Ball or a Box instead of {region.describe()}")
 
 

@@ -66,18 +66,13 @@ def read_system_card(file: Path, shown: str) -> CoilSystem:
             coils=tuple(replace(coil, current_limit=limit) for coil in calibrated.coils),
             workspace=workspace or calibrated.workspace,
         )
-    coils = tuple(_coil(entry, file.parent, limit) for entry in _entries(card))
+    coils = tuple(_coil(entry, file.parent, limit) for entry in card.tables("coils"))
+    if not coils:
+        raise card.error("coils must be one or more tables [[coils]]", "coils")
     try:
         return CoilSystem(name, coils, workspace=workspace or Everywhere(), source=source)
     except InputError as error:
         raise card.error(str(error), "coils") from None
-
-
-def _entries(card: Table) -> list[Table]:
-    entries = card.value("coils")
-    if not isinstance(entries, list) or not entries or not all(isinstance(entry, dict) for entry in entries):
-        raise card.error("coils must be one or more tables [[coils]]", "coils")
-    return [Table(card.origin, entry, f"coils[{k}]") for k, entry in enumerate(entries)]
 
 
 def _coil(entry: Table, folder: Path, limit: float | None) -> SystemCoil:

@@ -21,8 +21,8 @@ from magfem.actuation.coil_system import CoilSystem, SystemCoil
 from magfem.errors import CardError, InputError
 from magfem.fields.region_json import region_from_dict, region_to_dict
 from magfem.fields.terms_json import number, numbers, terms_from_list, terms_to_list
-from magfem.files import read_json, write_json
-from magfem.units import describe, one_line
+from magfem.files import not_whole, read_json, write_json
+from magfem.units import describe
 
 FORMAT, VERSION = "magfem-system", 1
 
@@ -94,15 +94,7 @@ def read_system(file: Path, shown: str) -> CoilSystem:
             data["name"], tuple(coils), background, workspace, data["source"], data["report"], data["provenance"]
         )
     except _WRONG as error:
-        reason = f"{key} is not laid out as in a system file"
-        if isinstance(error, KeyError):
-            reason = f"missing key {error}"
-        elif isinstance(error, InputError):
-            reason = str(error)
-        elif isinstance(error, ValueError):
-            reason = f"expected {error}"
-        where = f"{shown}: {key}" if key else shown
-        raise CardError(f"not a whole coil system: {one_line(reason)}", where) from None
+        raise not_whole("coil system", error, shown, key) from None
 
 
 def _coil_to_dict(coil: SystemCoil) -> dict[str, Any]:

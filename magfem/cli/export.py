@@ -191,7 +191,7 @@ def _vtu(field: Field, path: Path, options: Namespace) -> dict[str, Any]:
 
 def _samples(field: Field, path: Path, options: Namespace) -> dict[str, Any]:
     from magfem.cli.points import field_text
-    from magfem.exchange.region_parts import region_points
+    from magfem.fields.region_parts import region_points
     from magfem.files import write_text
 
     given = _points(options)

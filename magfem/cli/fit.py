@@ -10,12 +10,17 @@ from typing import TYPE_CHECKING, Any
 from magfem.cli.console import listing, moment_text, show_result, table
 from magfem.cli.outputs import output_file
 from magfem.cli.parser import CommandLine, add_dimension, add_resolution
-from magfem.errors import InputError
-from magfem.units import format_quantity, quantity, quoted
+from magfem.cli.samples import (
+    add_samples_options,
+    columns_and_sigma,
+    is_samples,
+    read_any_samples,
+    refuse_samples_options,
+)
+from magfem.units import format_quantity, quoted
 
 if TYPE_CHECKING:
     from magfem.fitting import FieldModel, Recipe
-    from magfem.samples import Samples, SystemSamples
 
 
 def add(commands: CommandLine) -> None:
@@ -44,18 +49,17 @@ def add(commands: CommandLine) -> None:
     parser.add_argument("--family", metavar="NAME", help='of models, or "search" (default: what suits the device)')
     samples = parser.add_argument_group("samples")
     samples.add_argument("--device", metavar="CARD", help="whose samples they are; not for coil systems")
-    samples.add_argument("--column", metavar="NAME=COLUMN", action="append", help="what stands for x, y, z, Bx, ...")
-    samples.add_argument("--sigma", metavar="QUANTITY", help="standard deviation of every component, such as '0.1 mT'")
+    add_samples_options(samples)
     samples.add_argument("--free", metavar="NAME", action="append", help="centre, tilt, turn, offsets, gain, ...")
     samples.add_argument("--background", action="store_true", help="find a static field as well")
 
 
 def run(options: Namespace) -> int:
     """Solve or read, fit, write, print the errors."""
-    if _is_samples(options.target):
+    if is_samples(options.target):
         from magfem.samples import SystemSamples
 
-        samples = _read(options)
+        samples = read_any_samples(options.target, options)
         if isinstance(samples, SystemSamples):
             from magfem.cli.fit_system import fit_system
 
@@ -81,11 +85,9 @@ def _recipe(options: Namespace) -> Recipe | str | Path:
     from magfem.geometry.catalogue import is_path, names
 
     target, choices = options.target, {"circuit": options.circuit, "family": options.family}
-    if _is_samples(target):
+    if is_samples(target):
         return _samples_recipe(options)
-    for option in ("device", "column", "sigma", "free", "background"):
-        if getattr(options, option):
-            raise InputError(f"--{option} is for samples: a file that ends in .csv or .txt, got {quoted(target)}")
+    refuse_samples_options(options, f"target, got {quoted(target)}", "device", "free", "background")
     if is_path(target, ".toml"):
         is_recipe = "kind" not in read_table(Path(target), target)
     else:
@@ -104,30 +106,15 @@ def _recipe(options: Namespace) -> Recipe | str | Path:
     return replace(loaded, **given)
 
 
-def _is_samples(target: str) -> bool:
-    return target.lower().endswith((".csv", ".txt"))
-
-
-def _read(options: Namespace) -> Samples | SystemSamples:
-    from magfem.samples import parse_columns, read_samples
-
-    return read_samples(options.target, parse_columns(options.column or []), _sigma(options))
-
-
-def _sigma(options: Namespace) -> float | None:
-    return quantity(options.sigma, "flux density") if options.sigma else None
-
-
 def _samples_recipe(options: Namespace) -> Recipe:
     from magfem.fitting.recipe import Recipe, SamplesFile
     from magfem.geometry import load_geometry
-    from magfem.samples import parse_columns
 
     return Recipe(
         geometry=load_geometry(options.device) if options.device else None,
         family=options.family,
         circuit=options.circuit,
-        samples=SamplesFile(Path(options.target), parse_columns(options.column or []), _sigma(options)),
+        samples=SamplesFile(Path(options.target), *columns_and_sigma(options)),
         free=dict.fromkeys(options.free or []),
         background=options.background,
     )

@@ -8,9 +8,9 @@ from collections.abc import Callable, Sequence
 from difflib import get_close_matches
 from typing import NoReturn
 
-import magfem
 from magfem.errors import InputError
 from magfem.units import quoted
+from magfem.version import __version__
 
 Run = Callable[[Namespace], int]
 """What a command does with its options; returns the exit code, 0 or 1."""
@@ -53,7 +53,7 @@ class CommandLine:
             formatter_class=argparse.RawDescriptionHelpFormatter,
             allow_abbrev=False,
         )
-        self.parser.add_argument("--version", action="version", version=f"magfem {magfem.__version__}")
+        self.parser.add_argument("--version", action="version", version=f"magfem {__version__}")
         _add_common_options(self.parser)
         self._subparsers = self.parser.add_subparsers(metavar="COMMAND", title="commands", required=True)
         self.commands: dict[str, Parser] = {}

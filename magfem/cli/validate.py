@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from magfem.cli.console import listing, show_result, table
 from magfem.cli.outputs import output_file
 from magfem.cli.parser import CommandLine
-from magfem.cli.samples import add_samples_options, read_model_samples, refuse_samples_options
+from magfem.cli.samples import add_samples_options, is_samples, read_model_samples, refuse_samples_options
 from magfem.errors import CardError, InputError
 from magfem.units import format_quantity
 
@@ -84,7 +84,7 @@ def _reference(model: FieldModel, options: Namespace) -> tuple[Field | Samples, 
     if against is None:
         _check_device(model, shown)
         against = "fem"
-    if against.lower().endswith((".csv", ".txt")):
+    if is_samples(against):
         return read_model_samples(against, options, "--against"), f"the samples {Path(against).name}"
     refuse_samples_options(options, "--against")
     if options.aligned is not None:

@@ -17,15 +17,15 @@ from jinja2 import Environment, FunctionLoader, StrictUndefined
 
 from magfem.constants import MU_0
 from magfem.errors import InputError
-from magfem.exchange.about import facts, terms_of
-from magfem.exchange.region_parts import RegionPart, region_parts
 from magfem.fields.field import Field
 from magfem.fields.hull import BoxHull, CylinderHull, Hull, SphereHull
 from magfem.fields.region import Region, Shell
+from magfem.fields.region_parts import RegionPart, region_parts
 from magfem.fields.solid_harmonics import interior_scale, schmidt_scale
 from magfem.fields.term_kinds import CHARGE_DISC, HARMONIC, INTERIOR, LOOP, NAMES, OBLATE, PATH
 from magfem.fields.terms import Terms
 from magfem.fields.workspace_region import Ball, Box
+from magfem.fitting.about import facts, terms_of
 from magfem.units import quoted
 
 _PIECES = {

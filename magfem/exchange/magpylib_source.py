@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from magfem.errors import InputError, UnitMismatchError
-from magfem.exchange.about import facts
 from magfem.fields.field import OUTSIDE, Evaluated, Field, Unit
 from magfem.fields.region import Everywhere, Region
+from magfem.fitting.about import facts
 from magfem.geometry.catalogue import is_path
 from magfem.typing import Floats, Hessians, Jet, Outside, Points, Tensors, Vectors
 from magfem.units import describe, one_line

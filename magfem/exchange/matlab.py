@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 from scipy.io import savemat
 
-from magfem.exchange.about import ascii_text, facts, terms_of
 from magfem.fields.field import Field
 from magfem.fields.term_kinds import NAMES
 from magfem.files import write_bytes
+from magfem.fitting.about import ascii_text, facts, terms_of
 
 EVALUATOR = "magfem_field.m"
 """The function's file. One serves all models of a folder."""

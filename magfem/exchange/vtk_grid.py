@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 
 from magfem.errors import InputError
-from magfem.exchange.about import ascii_text, facts
-from magfem.exchange.region_parts import bounding_box, region_points
 from magfem.fields.field import Field, as_points
+from magfem.fields.region_parts import bounding_box, region_points
 from magfem.files import write_bytes
+from magfem.fitting.about import ascii_text, facts
 from magfem.typing import ArrayLike, Points
 
 LONGEST = 61

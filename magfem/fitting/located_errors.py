@@ -10,14 +10,13 @@ import numpy as np
 from magfem.fields.field import Field
 from magfem.fields.norms import FLOOR
 from magfem.fields.region import SampledRegion, Shell
-from magfem.fields.workspace_region import Ball, Box
+from magfem.fields.region_parts import bounding_box
 from magfem.typing import ArrayLike, Floats, Jet, Points
 
 QUANTITIES = ("B", "gradient")
 _APART = 0.1  # of the points' extent: worst points nearer to each other than this are one place
 _GROUPS = 12  # of distances
 _FEWEST = 4  # points that make a group
-_EDGE = 0.03  # of a region's extent: drawn points come as near as this to the limits of a window
 _ALIKE = 0.05  # distances that differ by less than this share are one
 
 
@@ -82,27 +81,8 @@ def distance_name(region: SampledRegion) -> str:
 
 def middle(region: SampledRegion) -> Floats:
     """A region's middle (3,) m: that of its box."""
-    if isinstance(region, Ball):
-        return np.array(region.centre)
-    low, high = bounds(region)
-    centre: Floats = 0.5 * (low + high)
+    centre: Floats = bounding_box(region).mean(axis=0)
     return centre
-
-
-def bounds(region: SampledRegion) -> tuple[Floats, Floats]:
-    """Corners (3,) m of the box about a region, by points drawn from it where there is no simpler way."""
-    if isinstance(region, Ball):
-        return np.array(region.centre) - region.radius, np.array(region.centre) + region.radius
-    if isinstance(region, Box):
-        return np.array(region.low), np.array(region.high)
-    points = region.layers(np.random.default_rng(6), 48, 96).reshape(-1, 3)
-    low, high = points.min(axis=0), points.max(axis=0)
-    if isinstance(region, Shell):  # its window, which random points hardly reach
-        slack = _EDGE * (high - low)
-        for axis, limits in enumerate(((-region.rho[1], region.rho[1]), (-region.rho[1], region.rho[1]), region.z)):
-            low[axis] = limits[0] if abs(low[axis] - limits[0]) < slack[axis] else low[axis]
-            high[axis] = limits[1] if abs(high[axis] - limits[1]) < slack[axis] else high[axis]
-    return low, high
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,11 +17,11 @@ from magfem.fields.region_json import region_from_dict, region_to_dict
 from magfem.fields.terms import Terms
 from magfem.fields.terms_json import number, numbers, terms_from_list, terms_to_list
 from magfem.fields.workspace_region import Ball, Box
-from magfem.files import read_json, write_json
+from magfem.files import not_whole, read_json, write_json
 from magfem.fitting.uncertainty import predictive_deviation
 from magfem.geometry.catalogue import resolve, short_path
 from magfem.typing import ArrayLike, Floats, Integers, Jet, Outside, Points
-from magfem.units import describe, one_line
+from magfem.units import describe
 
 FORMAT, VERSION = "magfem-model", 1
 
@@ -30,16 +30,16 @@ FORMAT, VERSION = "magfem-model", 1
 class FieldModel(Evaluated):
     """A fitted field; a Field in T.
 
-    lowered: the terms.  covariance: (p, p) of the free parameters; parameter: (c,) the free parameter behind
-    every coefficient, share: (c,) what the coefficient is of it.  region: where it holds.  report: what the fit
-    measured about itself (training, heldout, fem, bound, condition, worst, candidates, comparison).  provenance:
-    device with its card, solver settings, versions, date.
+    lowered: the terms.  covariance: (p, p) of the free parameters, None where it is not known; parameter: (c,) the
+    free parameter behind every coefficient, share: (c,) what the coefficient is of it.  region: where it holds.
+    report: what the fit measured about itself (training, heldout, fem, bound, condition, worst, candidates,
+    comparison).  provenance: device with its card, solver settings, versions, date.
     """
 
     name: str
     lowered: Terms
     parameter: Integers
-    covariance: Floats
+    covariance: Floats | None
     region: SampledRegion
     report: dict[str, Any]
     provenance: dict[str, Any]
@@ -60,7 +60,11 @@ class FieldModel(Evaluated):
         """Standard deviations of B (..., 3) T and of the gradient (..., 3, 3) T/m at `points` (..., 3) m.
 
         What the noise of the fitted data makes of the coefficients, by their covariance; not what the model cannot
-        describe: `report["uncertainty"]` says whether that dominates. Raises as `jet` does.
+        describe. Of models of samples `report["uncertainty"]` says whether that dominates. Closed forms and solutions
+        have no noise: there the fit's residual is taken for it, as if it were independent from row to row, and
+        `report["bound"]` is what to trust.
+
+        Raises as `jet` does, and InputError for a model whose covariance is not known, such as published coefficients.
         """
         return predictive_deviation(self, points, outside)
 
@@ -93,7 +97,7 @@ class FieldModel(Evaluated):
             "terms": list(self.terms),
             "parameter": [int(index) for index in self.parameter],
             **({} if self._shares is None else {"share": self._shares.tolist()}),
-            "covariance": np.asarray(self.covariance).tolist(),
+            "covariance": None if self.covariance is None else np.asarray(self.covariance).tolist(),
             "region": region_to_dict(self.region),
             "report": self.report,
             "provenance": self.provenance,
@@ -138,8 +142,8 @@ def load_model(name_or_path: str | Path) -> FieldModel:
         if share is not None and share.shape != parameter.shape:
             raise ValueError("one number for each coefficient")
         key = "covariance"
-        covariance = numbers(data["covariance"])
-        if covariance.shape != (parameter.max() + 1,) * 2:
+        covariance = None if data["covariance"] is None else numbers(data["covariance"])
+        if covariance is not None and covariance.shape != (parameter.max() + 1,) * 2:
             raise ValueError("one row and one column for each parameter")
         key = "region"
         region = region_from_dict(data["region"])
@@ -149,14 +153,7 @@ def load_model(name_or_path: str | Path) -> FieldModel:
         if not all(number(data["report"]["bound"][name]) >= 0 for name in ("B", "gradient")):
             raise ValueError("relative errors of B and gradient")
     except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError, InputError) as error:
-        reason = f"{key} is not laid out as in a field model"
-        if isinstance(error, KeyError):
-            reason = f"missing key {error}"
-        elif isinstance(error, InputError):
-            reason = str(error)
-        elif isinstance(error, ValueError):
-            reason = f"expected {error}"
-        raise CardError(f"not a whole field model: {one_line(reason)}", f"{shown}: {key}") from None
+        raise not_whole("field model", error, shown, key) from None
     return FieldModel(
         name=data["name"],
         lowered=lowered,

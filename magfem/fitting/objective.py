@@ -6,6 +6,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
+from magfem.fields.norms import FLOOR
 from magfem.fitting.candidate import Candidate
 from magfem.fitting.sampling import LayeredData
 from magfem.typing import Floats
@@ -13,7 +14,6 @@ from magfem.typing import Floats
 Objective: TypeAlias = Literal["layers", "absolute", "relative"]
 
 _GRADIENT_WEIGHT = 0.1  # relative errors of the gradient weigh a tenth of those of B, as the targets do
-_FLOOR = 0.01  # of the largest field: smaller ones do not count relative to themselves
 
 
 def rows(candidate: Candidate, data: LayeredData, objective: Objective) -> tuple[Floats, Floats]:
@@ -43,6 +43,6 @@ def _sizes(values: Floats, objective: Objective) -> Floats:
         layers: Floats = np.sqrt(np.mean(size**2, axis=1, keepdims=True))
         return layers
     if objective == "relative":
-        floored: Floats = np.maximum(size, _FLOOR * size.max())
+        floored: Floats = np.maximum(size, FLOOR * size.max())
         return floored
     return np.ones_like(size)

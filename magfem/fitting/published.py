@@ -61,8 +61,8 @@ def is_published(name_or_path: str | Path) -> bool:
 def load_published(name_or_path: str | Path) -> FieldModel:
     """The model of a recipe of published coefficients, per ampere. Raises InputError, CardError.
 
-    Nothing was fitted here: the report holds the stated bound and its ground, no errors at points, and the covariance
-    is zero because none was published.
+    Nothing was fitted here: the report holds the stated bound and its ground, no errors at points, and no
+    covariance is known, because none was published.
     """
     where = ("fits", name_or_path, ".toml")
     table = read_table(resolve(*where), short_path(*where))
@@ -85,7 +85,7 @@ def load_published(name_or_path: str | Path) -> FieldModel:
         name=table.text("name"),
         lowered=published_axial_multipole(given),
         parameter=np.arange(count),
-        covariance=np.zeros((count, count)),
+        covariance=None,
         region=_region(table.table("region")),
         report={
             "family": "published",

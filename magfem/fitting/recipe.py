@@ -24,9 +24,9 @@ from magfem.fitting.families.options import is_number, is_whole, shown
 from magfem.fitting.least_squares import Ridge
 from magfem.fitting.measurement import Loss, Weighting
 from magfem.fitting.objective import Objective
+from magfem.fitting.readings import Reading, check_readings
 from magfem.geometry import Coil, Geometry
 from magfem.geometry.limits import InvalidValue
-from magfem.samples.single_components import Measurement
 
 SEARCH, DEVICE = "search", "device"
 """Instead of a family's name: all families that describe the device; for samples, the device's own field, scaled."""
@@ -85,7 +85,7 @@ class Recipe:
     background: bool = False
     free: Mapping[str, tuple[float, float] | None] = field(default_factory=dict)
     samples: SamplesFile | None = None
-    measurements: tuple[Measurement, ...] = ()
+    measurements: tuple[Reading, ...] = ()
 
     def __post_init__(self) -> None:
         for key in _RULES:
@@ -188,8 +188,8 @@ _RULES: dict[str, tuple[Callable[[Any], bool], str]] = {
     ),
     "samples": (lambda value: value is None or isinstance(value, SamplesFile), "samples must be a SamplesFile"),
     "measurements": (
-        lambda value: isinstance(value, tuple | list) and all(isinstance(one, Measurement) for one in value),
-        "measurements must be a tuple of Measurement",
+        lambda value: isinstance(value, tuple | list) and all(isinstance(one, Reading) for one in value),
+        "measurements must be a tuple of Reading",
     ),
 }
 
@@ -231,17 +231,7 @@ def check_for_fields(recipe: Recipe) -> None:
         )
 
 
-def check_readings(measurements: Sequence[Measurement]) -> None:
-    """Raise InvalidValue where nothing says how sure the factor of single readings is (`scaling.scale_to`)."""
-    for number, one in enumerate(measurements):
-        key = f"measurement[{number}].uncertainty"
-        if one.uncertainty is None and len(measurements) == 1:
-            raise InvalidValue("a scale from a single measurement needs its uncertainty", key)
-        if one.uncertainty is None and one.value == 0:
-            raise InvalidValue("a measurement of zero needs an uncertainty: it cannot be weighed by its size", key)
-
-
-def check_places(measurements: Sequence[Measurement], region: Region) -> None:
+def check_places(measurements: Sequence[Reading], region: Region) -> None:
     """Raise InvalidValue for single readings outside the region that the model holds in."""
     for number, one in enumerate(measurements):
         if not region.contains(one.position):

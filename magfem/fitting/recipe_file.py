@@ -12,12 +12,12 @@ from magfem.errors import CardError, InputError
 from magfem.fields.region import Shell
 from magfem.fitting.alignment import ANGLES, LENGTHS, alignment_of
 from magfem.fitting.families.options import OPTIONS
+from magfem.fitting.readings import readings_from_table
 from magfem.fitting.recipe import Recipe, SamplesFile, complaint_about
 from magfem.geometry import load_geometry
 from magfem.geometry.card import Table, read_table
 from magfem.geometry.catalogue import resolve, short_path
 from magfem.geometry.vectors import three_lengths
-from magfem.samples.single_components import measurements_from_table
 from magfem.units import describe
 
 _KEYS = (
@@ -82,7 +82,7 @@ def load_recipe(name_or_path: str | Path) -> Recipe:
         values["samples"] = _samples(table.table("samples"), file)
     if "free" in table:
         values["free"] = _free(table.table("free"))
-    values["measurements"] = measurements_from_table(table)
+    values["measurements"] = readings_from_table(table)
     try:
         with table.locating():
             return Recipe(**values)

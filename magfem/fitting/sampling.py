@@ -11,6 +11,7 @@ from magfem.errors import InputError
 from magfem.fields.field import Field
 from magfem.fields.norms import relative_errors
 from magfem.fields.region import Shell
+from magfem.fitting.located_errors import LocatedErrors
 from magfem.typing import Booleans, Floats, Jet, Points
 
 SHAPES = {"training": (28, 24, 4), "selection": (24, 24, 10), "heldout": (64, 34, 15)}
@@ -71,11 +72,9 @@ def layer_errors(jet: Jet, data: LayeredData, counted: Booleans | None = None) -
 
 
 def worst_places(jet: Jet, data: LayeredData, region: Shell) -> dict[str, Any]:
-    """Where the largest errors are: point and hull distance, m."""
+    """The largest error of each, and where it is: point and hull distance, m."""
     worst: dict[str, Any] = {}
     for key, found, truth in zip(("B", "gradient"), jet, (data.B, data.gradient), strict=True):
         errors = relative_errors(found.reshape(truth.shape), truth)
-        point = data.points[np.unravel_index(np.argmax(errors), errors.shape)]
-        distance = float(region.hull.distance(point))
-        worst[key] = {"point": point.tolist(), "distance": distance, "error": float(errors.max())}
+        (worst[key],) = LocatedErrors(data.flat, region.hull.distance(data.flat), errors.ravel()).worst(1)
     return worst

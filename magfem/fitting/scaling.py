@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 
 from magfem.errors import InputError
 from magfem.fitting.model import FieldModel
-from magfem.samples.single_components import Measurement
+from magfem.fitting.readings import Reading, check_readings
 from magfem.typing import Floats
 
 
@@ -41,7 +41,7 @@ class Scale:
         }
 
 
-def scale_to(model: FieldModel, measurements: Sequence[Measurement]) -> Scale:
+def scale_to(model: FieldModel, measurements: Sequence[Reading]) -> Scale:
     """The factor that single components agree on best.
 
     Each implies a factor with the deviation of its reading. Where they disagree by more than that, distances or
@@ -55,13 +55,8 @@ def scale_to(model: FieldModel, measurements: Sequence[Measurement]) -> Scale:
         raise InputError("a scale needs one measurement or more")
     if model.unit != "T":
         raise InputError("measurements in T do not scale a model per ampere: state the current instead")
-    known = all(one.uncertainty is not None for one in measurements)
-    if not known and any(one.uncertainty is not None for one in measurements):
-        raise InputError("either all measurements have an uncertainty or none: they could not be weighed otherwise")
-    if len(measurements) == 1 and not known:
-        raise InputError("a scale from a single measurement needs its uncertainty")
-    if not known and any(one.value == 0 for one in measurements):
-        raise InputError("a measurement of zero needs an uncertainty: it cannot be weighed by its size")
+    check_readings(measurements)
+    known = measurements[0].uncertainty is not None
     value = np.array([one.value for one in measurements])
     predicted = np.array([float(model.B(one.position) @ one.direction) for one in measurements])
     if not np.all(np.abs(predicted) > 1e-9 * np.abs(predicted).max()):
@@ -88,10 +83,12 @@ def scale_to(model: FieldModel, measurements: Sequence[Measurement]) -> Scale:
 
 def scaled(model: FieldModel, scale: Scale) -> FieldModel:
     """The model times the factor; the factor's own deviation goes into covariance and bound."""
-    values = np.zeros(len(model.covariance))
-    share = np.ones(model.parameter.size) if model.share is None else model.share
-    values[model.parameter] = model.lowered.coefficient / np.where(share == 0, 1.0, share)
-    covariance = scale.factor**2 * model.covariance + scale.deviation**2 * np.outer(values, values)
+    covariance = model.covariance
+    if covariance is not None:
+        values = np.zeros(len(covariance))
+        share = np.ones(model.parameter.size) if model.share is None else model.share
+        values[model.parameter] = model.lowered.coefficient / np.where(share == 0, 1.0, share)
+        covariance = scale.factor**2 * covariance + scale.deviation**2 * np.outer(values, values)
     share_of_bound = abs(scale.deviation / scale.factor)
     bound = {key: value + 2 * share_of_bound for key, value in model.report["bound"].items()}
     return replace(

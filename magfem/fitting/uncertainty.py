@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from magfem.errors import InputError
 from magfem.fields.field import as_points, promised_points
 from magfem.typing import ArrayLike, Floats, Outside
+from magfem.units import quoted
 
 if TYPE_CHECKING:
     from magfem.fitting.model import FieldModel
@@ -19,7 +21,15 @@ _BLOCK = 4096  # points worked on at a time: every parameter takes twelve number
 
 
 def predictive_deviation(model: FieldModel, points: ArrayLike, outside: Outside = "raise") -> tuple[Floats, Floats]:
-    """Standard deviations of B (..., 3) and of the gradient (..., 3, 3) at `points` (..., 3) m."""
+    """Standard deviations of B (..., 3) and of the gradient (..., 3, 3) at `points` (..., 3) m.
+
+    Raises InputError for a model whose covariance is not known, and as `jet` does.
+    """
+    if model.covariance is None:
+        raise InputError(
+            f"no covariance is known of the coefficients of {quoted(model.name)}, so there are no deviations: "
+            "its report states a bound instead"
+        )
     array = as_points(points)
     flat = array.reshape(-1, 3)
     promised = promised_points(flat, model.region, outside)

@@ -97,6 +97,16 @@ class Table:
             raise self.error(f"{key} must be a table, got {describe(value)}", key)
         return Table(self.origin, value, self.dotted(key))
 
+    def tables(self, key: str) -> list[Table]:
+        """The tables of the array `[[key]]`, each named `key[0]`, `key[1]`, … in messages."""
+        value = self.value(key)
+        if not isinstance(value, list):
+            raise self.error(f"{key} must be a list of tables, [[{key}]], got {describe(value)}", key)
+        for number, entry in enumerate(value):
+            if not isinstance(entry, dict):
+                raise self.error(f"{key} must be a list of tables, got {describe(entry)} in it", f"{key}[{number}]")
+        return [Table(self.origin, entry, self.dotted(f"{key}[{number}]")) for number, entry in enumerate(value)]
+
     @contextmanager
     def locating(self) -> Iterator[None]:
         """Within it, a device refusing a value says where in this card the value stands."""

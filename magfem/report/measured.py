@@ -7,22 +7,22 @@ from dataclasses import dataclass
 import numpy as np
 
 from magfem.fields import Field
+from magfem.fitting.readings import Reading
 from magfem.report.numbers import number, percent
-from magfem.samples.single_components import Measurement
 
 
 @dataclass(frozen=True)
 class Compared:
     """One measurement, the value predicted for it at the nominal remanence (T), and the remanence it implies (T)."""
 
-    measurement: Measurement
+    measurement: Reading
     predicted: float
 
     remanence: float
     uncertainty: float | None  # T, of the implied remanence
 
 
-def compare(measurements: tuple[Measurement, ...], field: Field, nominal: float) -> tuple[Compared, ...]:
+def compare(measurements: tuple[Reading, ...], field: Field, nominal: float) -> tuple[Compared, ...]:
     """Each measurement beside `field`, the prediction at the nominal remanence (T), to which B is proportional."""
     found = []
     for m in measurements:

@@ -10,9 +10,10 @@ import numpy as np
 
 from magfem.fields import Shell
 from magfem.fields.region import SampledRegion
+from magfem.fields.region_parts import bounding_box
 from magfem.fitting import FieldModel, validate
 from magfem.fitting.alignment import ANGLES
-from magfem.fitting.located_errors import bounds, middle
+from magfem.fitting.located_errors import middle
 from magfem.geometry import Coil, Magnets, PermanentMagnet, describe
 from magfem.report import measured, numbers
 from magfem.report.coil_page import coil_facts
@@ -301,7 +302,7 @@ def _gradient_unit(model: FieldModel) -> str:
 
 def _inside(region: SampledRegion) -> str:
     """A point of the region, as Python writes it: on the z axis if it meets it, in whole millimetres if possible."""
-    low, high = bounds(region)
+    low, high = bounding_box(region)
     height = np.linspace(max(float(low[2]), 0.0) if isinstance(region, Shell) else float(low[2]), float(high[2]), 20001)
     height = height[region.contains(np.stack([0 * height, 0 * height, height], axis=-1))]
     if height.size < 2:

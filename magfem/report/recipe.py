@@ -5,9 +5,9 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 
+from magfem.fitting.readings import Reading, readings_from_table
 from magfem.geometry.card import Table, read_table
 from magfem.geometry.catalogue import resolve, short_path
-from magfem.samples.single_components import Measurement, measurements_from_table
 
 
 @dataclass(frozen=True)
@@ -16,7 +16,7 @@ class Recipe:
 
     device: str  # name or path of the device card
     title: str  # empty: the device's name
-    measurements: tuple[Measurement, ...]
+    measurements: tuple[Reading, ...]
 
 
 def load_recipe(name_or_path: str | os.PathLike[str]) -> Recipe:
@@ -31,5 +31,5 @@ def recipe_from_table(table: Table) -> Recipe:
     return Recipe(
         device=table.text("device"),
         title=table.text("title") if "title" in table else "",
-        measurements=measurements_from_table(table),
+        measurements=readings_from_table(table),
     )

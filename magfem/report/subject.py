@@ -12,12 +12,12 @@ from magfem.fem import Solution, solve
 from magfem.fem.coil_solution import CoilSolution
 from magfem.fields import Field
 from magfem.fitting import FieldModel, fit, load_model
+from magfem.fitting.readings import Reading
 from magfem.geometry import Coil, Geometry, Magnets, geometry_from_text, load_geometry
 from magfem.geometry.card import read_table
 from magfem.geometry.catalogue import is_path, names
 from magfem.report.recipe import Recipe, load_recipe
 from magfem.samples import Samples
-from magfem.samples.single_components import Measurement
 
 log = logging.getLogger("magfem")
 
@@ -37,7 +37,7 @@ class Subject:
     is_model: bool = False
     geometry: Geometry | None = None
     solution: Solution | CoilSolution | None = None
-    measurements: tuple[Measurement, ...] = ()
+    measurements: tuple[Reading, ...] = ()
     samples: Samples | None = None
 
     @property

@@ -13,8 +13,29 @@ from magfem.typing import ArrayLike, Booleans, Floats, Integers, Points, Vectors
 AXES = ("x", "y", "z")
 
 
+class _AtPoints:
+    """What samples of either kind tell of their points."""
+
+    points: Points
+
+    @property
+    def count(self) -> int:
+        """How many points, one for each row."""
+        return len(self.points)
+
+    @property
+    def centre(self) -> Floats:
+        """Middle (3,) m of the box about the points."""
+        return np.asarray(0.5 * (self.points.min(axis=0) + self.points.max(axis=0)))
+
+    @property
+    def extent(self) -> Floats:
+        """Edges (3,) m of the box about the points."""
+        return np.asarray(np.ptp(self.points, axis=0))
+
+
 @dataclass(frozen=True, eq=False, repr=False)
-class Samples:
+class Samples(_AtPoints):
     """B at n points, as measured or computed. The arrays are copied and cannot be written to.
 
     points: (n, 3) m.
@@ -48,24 +69,9 @@ class Samples:
         return f"Samples({self.count} points, {self.unit}, {self.source!r})"
 
     @property
-    def count(self) -> int:
-        """How many points."""
-        return len(self.points)
-
-    @property
     def measured(self) -> Booleans:
         """Which components (n, 3) were measured."""
         return ~np.isnan(self.B)
-
-    @property
-    def centre(self) -> Floats:
-        """Middle (3,) m of the box about the points."""
-        return _centre(self.points)
-
-    @property
-    def extent(self) -> Floats:
-        """Edges (3,) m of the box about the points."""
-        return _extent(self.points)
 
     def subset(self, which: Booleans | Integers | slice) -> Samples:
         """The samples of a mask (n,), of indices or of a slice."""
@@ -75,7 +81,7 @@ class Samples:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SystemSamples:
+class SystemSamples(_AtPoints):
     """B at n points of a system of c coils, each row at currents of its own. The arrays are copied, and read-only.
 
     points: (n, 3) m.  currents: (n, c) A.  B: (n, 3) T, all components measured.
@@ -104,24 +110,9 @@ class SystemSamples:
         return f"SystemSamples({self.count} points, {self.coils} coils, {self.source!r})"
 
     @property
-    def count(self) -> int:
-        """How many rows, each a point with its currents."""
-        return len(self.points)
-
-    @property
     def coils(self) -> int:
         """How many coils."""
         return int(self.currents.shape[1])
-
-    @property
-    def centre(self) -> Floats:
-        """Middle (3,) m of the box about the points."""
-        return _centre(self.points)
-
-    @property
-    def extent(self) -> Floats:
-        """Edges (3,) m of the box about the points."""
-        return _extent(self.points)
 
     def subset(self, which: Booleans | Integers | slice) -> SystemSamples:
         """The samples of a mask (n,), of indices or of a slice."""
@@ -179,14 +170,6 @@ def _refuse(wrong: Booleans, message: str) -> None:
     rows = np.flatnonzero(wrong.any(axis=1))
     if rows.size:
         raise InputError(f"{message} [sample {rows[0]}, the first being 0]")
-
-
-def _centre(points: Points) -> Floats:
-    return np.asarray(0.5 * (points.min(axis=0) + points.max(axis=0)))
-
-
-def _extent(points: Points) -> Floats:
-    return np.asarray(np.ptp(points, axis=0))
 
 
 def _keep(owner: object, **arrays: Floats | None) -> None:

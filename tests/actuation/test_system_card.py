@@ -109,8 +109,9 @@ def test_catalogue_holds_both_systems():
     ("text", "complaint"),
     [
         ("", r'missing key "coils" \[.*system.toml: coils\]'),
-        ("coils = 3", "coils must be one or more tables"),
-        ("coils = [1]", "coils must be one or more tables"),
+        ("coils = 3", "coils must be a list of tables"),
+        ("coils = []", "coils must be one or more tables"),
+        ("coils = [1]", r"coils must be a list of tables, got 1 in it \[.*: coils\[0\]\]"),
         (coil() + coil(), '"a" is given twice'),
         (coil("colour = 1"), r'unknown key "colour".*coils\[0\]\.colour\]'),
         ('[[coils]]\nmodel = "bigmag_air"', r'missing key "name" \[.*: coils\[0\]\.name\]'),

@@ -16,10 +16,10 @@ import magfem
 from magfem.errors import InputError
 from magfem.exchange import c_header
 from magfem.exchange.c_source import as_c_name, c_name
-from magfem.exchange.region_parts import region_points
 from magfem.fields import Evaluated, Everywhere, Field, Shell
 from magfem.fields.hull import BoxHull, PolytopeHull, SphereHull
 from magfem.fields.region import Region
+from magfem.fields.region_parts import region_points
 from magfem.fields.terms import uniform
 from magfem.fields.workspace_region import Ball, Box
 from magfem.typing import Points

@@ -20,8 +20,8 @@ from magfem.cli import main
 from magfem.cli.export import TARGETS
 from magfem.cli.program import command_line
 from magfem.exchange import c_header
-from magfem.exchange.region_parts import bounding_box, region_points
 from magfem.fields import Field, Shell
+from magfem.fields.region_parts import bounding_box, region_points
 from magfem.fields.terms_json import terms_to_list
 from magfem.fields.workspace_region import Box
 from magfem.typing import Floats

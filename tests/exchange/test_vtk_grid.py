@@ -16,10 +16,10 @@ from vtkmodules.vtkIOXML import vtkXMLImageDataReader, vtkXMLUnstructuredGridRea
 import magfem
 from magfem.errors import InputError
 from magfem.exchange import write_grid, write_points
-from magfem.exchange.region_parts import bounding_box
 from magfem.exchange.vtk_grid import grid_shape
 from magfem.fields import Everywhere, Field, Shell
 from magfem.fields.region import Intersection, PlacedRegion, Region
+from magfem.fields.region_parts import bounding_box
 from magfem.fields.workspace_region import Ball, Box
 
 QUARTER = RigidTransform.from_rotation(Rotation.from_euler("z", 90, degrees=True))

@@ -81,6 +81,22 @@ def test_smallest_recipe(tmp_path):
     again = magfem.load_model(tmp_path / "one.json")
     assert (again.unit, again.region, again.report) == ("T/A", model.region, model.report)
     np.testing.assert_allclose(again.B([0, 0, 0.05]), [0, 0, 2e-7 / 0.05**3], rtol=1e-13, atol=1e-25)
+    for one in (model, again):
+        assert one.covariance is None and json.loads((tmp_path / "one.json").read_text())["covariance"] is None
+        with pytest.raises(InputError, match='no covariance is known of the coefficients of "one pole"'):
+            one.deviation([0, 0, 0.05])
+
+
+def test_committed_models_claim_no_certainty(tmp_path):
+    """Nobody published how well these coefficients are known, so that a deviation of 0 T would be made up."""
+    for name in ("bigmag_air", "bigmag_iron"):
+        model = magfem.load_model(name)
+        with pytest.raises(InputError, match="no covariance is known"):
+            model.deviation(model.region.centre)
+        for target in ("c", "mat", "mpem", "vtu"):
+            file = {"c": "h", "mpem": "yaml"}.get(target, target)
+            assert main(["export", name, "--to", target, "-o", str(tmp_path / f"{name}.{file}")]) == 0
+        assert main(["report", name, "-o", str(tmp_path / f"{name}.html")]) == 0
 
 
 @pytest.mark.parametrize(

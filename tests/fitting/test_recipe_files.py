@@ -63,6 +63,7 @@ source = "6.1.2"
 position = ["0 mm", "-1 mm", "4 mm"]
 direction = [0, -3, 4]
 value = "55 uT"
+uncertainty = "0.2 uT"
 source = "6.1.2"
 """
 MEASUREMENT = """
@@ -108,7 +109,7 @@ def test_every_key_sets_what_it_says(tmp_path: Path) -> None:
     first, second = recipe.measurements
     assert first.position == pytest.approx([2e-3, 0, 3e-3]) and first.direction.tolist() == [1, 0, 0]
     assert (first.value, first.uncertainty, first.source) == (pytest.approx(411e-6), pytest.approx(0.5e-6), "6.1.2")
-    assert second.direction == pytest.approx([0, -0.6, 0.8]) and second.uncertainty is None
+    assert second.direction == pytest.approx([0, -0.6, 0.8]) and second.uncertainty == pytest.approx(0.2e-6)
 
 
 def test_what_is_not_said_is_the_recipe_s_default(tmp_path: Path) -> None:

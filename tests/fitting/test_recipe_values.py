@@ -18,9 +18,9 @@ from magfem.fields.region import Shell
 from magfem.fitting import Recipe, load_recipe, model_from_recipe
 from magfem.fitting.families import FAMILIES, SAMPLE_FAMILIES
 from magfem.fitting.families.options import OPTIONS
+from magfem.fitting.readings import Reading
 from magfem.geometry import CylinderMagnet, RingMagnet
 from magfem.samples import Samples
-from magfem.samples.single_components import Measurement
 
 RING = "ring_magnet_4x1.5x1"
 SOLENOID = "solenoid_24x48x60"
@@ -335,9 +335,14 @@ SURE = 'uncertainty = "1 uT"\n'
     [
         (READING.format(x="3 m", value="1 mT") + SURE, "lies outside the model's region", "measurement[0].position"),
         (
-            READING.format(x="5 mm", value="1 mT") + SURE + READING.format(x="0 mm", value="1 mT"),
+            READING.format(x="5 mm", value="1 mT") + SURE + READING.format(x="0 mm", value="1 mT") + SURE,
             "lies outside the model's region",
             "measurement[1].position",
+        ),
+        (
+            READING.format(x="5 mm", value="1 mT") + SURE + READING.format(x="6 mm", value="1 mT"),
+            "either all measurements have an uncertainty or none",
+            "measurement[1].uncertainty",
         ),
         (
             READING.format(x="5 mm", value="1 mT"),
@@ -363,7 +368,7 @@ def test_readings_are_checked_before_the_solve(
 
 def test_readings_outside_a_recipe_s_own_region(rotor: CylinderMagnet) -> None:
     """5 mm from the middle is in the card's region, and not in one that ends 1 mm from the hull."""
-    reading = Measurement(np.array([5e-3, 0, 0]), np.array([1.0, 0, 0]), 1e-3, 1e-6, "here")
+    reading = Reading(np.array([5e-3, 0, 0]), np.array([1.0, 0, 0]), 1e-3, 1e-6, "here")
     Recipe(geometry=rotor, measurements=(reading,))
     with pytest.raises(InputError, match=r"at \(5, 0, 0\) mm lies outside"):
         Recipe(geometry=rotor, region=Shell(rotor.region.hull, 0.5e-3, 1e-3), measurements=(reading,))

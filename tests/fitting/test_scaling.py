@@ -9,9 +9,9 @@ import pytest
 
 import magfem
 from magfem.errors import InputError, OutsideRegionError
+from magfem.fitting.readings import Reading
 from magfem.fitting.scaling import scale_to, scaled
 from magfem.geometry import CylinderMagnet
-from magfem.samples.single_components import Measurement
 
 ALONG = np.array([1.0, 0.0, 0.0])
 DISTANCES = (10e-3, 20e-3, 30e-3, 40e-3)
@@ -20,8 +20,8 @@ UNCERTAINTY = 0.5e-6
 IMPLIED = (1.14, 1.21, 1.33, 1.22)  # T, the remanence that each asks for
 
 
-def reading(x: float, value: float, uncertainty: float | None = UNCERTAINTY, direction=ALONG) -> Measurement:
-    return Measurement(np.array([x, 0.0, 0.0]), np.asarray(direction, dtype=float), value, uncertainty, "a test")
+def reading(x: float, value: float, uncertainty: float | None = UNCERTAINTY, direction=ALONG) -> Reading:
+    return Reading(np.array([x, 0.0, 0.0]), np.asarray(direction, dtype=float), value, uncertainty, "a test")
 
 
 def test_each_reading_of_the_rotor_implies_a_remanence() -> None:
@@ -79,7 +79,7 @@ def test_exact_readings_give_the_exact_factor(rotor_model) -> None:
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     values = 1.07 * np.sum(rotor_model.B(points) * directions, axis=1)
     scale = scale_to(
-        rotor_model, [Measurement(*one, 1e-6, "") for one in zip(points, directions, values.tolist(), strict=True)]
+        rotor_model, [Reading(*one, 1e-6, "") for one in zip(points, directions, values.tolist(), strict=True)]
     )
     assert scale.factor == pytest.approx(1.07, rel=1e-12)
     np.testing.assert_allclose(scale.implied, 1.07, rtol=1e-10)
@@ -140,11 +140,11 @@ def test_readings_that_nothing_weighs_are_refused(rotor_model) -> None:
 
 
 def test_readings_that_cannot_be_weighed_are_refused(rotor_model) -> None:
-    known, unknown = reading(10e-3, 411e-6), Measurement(np.array([0.02, 0, 0]), np.array([1.0, 0, 0]), 55e-6, None, "")
+    known, unknown = reading(10e-3, 411e-6), Reading(np.array([0.02, 0, 0]), np.array([1.0, 0, 0]), 55e-6, None, "")
     with pytest.raises(InputError, match="either all measurements have an uncertainty or none"):
         scale_to(rotor_model, [known, unknown])
     exact = [
-        Measurement(np.array([x, 0, 0]), np.array([1.0, 0, 0]), float(rotor_model.B([x, 0, 0])[0]), None, "")
+        Reading(np.array([x, 0, 0]), np.array([1.0, 0, 0]), float(rotor_model.B([x, 0, 0])[0]), None, "")
         for x in DISTANCES
     ]
     with pytest.raises(InputError, match="agree exactly"):

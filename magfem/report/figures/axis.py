@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from magfem.fields import Field, Shell
+from magfem.fitting.readings import Reading
 from magfem.report.figures.rival import Rival
 from magfem.report.figures.style import (
     DASHES,
@@ -25,7 +26,6 @@ from magfem.report.figures.style import (
     png,
     wrapped,
 )
-from magfem.samples.single_components import Measurement
 from magfem.typing import Booleans, Floats
 
 MILLI = 1e3
@@ -49,7 +49,7 @@ def axis_figure(
     solution: Field | None,
     closed_form: Field | None,
     rivals: Sequence[Rival],
-    measurements: tuple[Measurement, ...],
+    measurements: tuple[Reading, ...],
 ) -> Picture:
     """Above: the component of B along `direction` (a unit vector); below: relative differences."""
     reach = region.hull.radius + region.extent
@@ -120,7 +120,7 @@ def _outside(region: Shell, direction: Floats, reach: float) -> Floats:
     return np.geomspace(along[0], along[-1], _SAMPLES)
 
 
-def _on_line(measurements: tuple[Measurement, ...], direction: Floats) -> list[tuple[float, float, Measurement]]:
+def _on_line(measurements: tuple[Reading, ...], direction: Floats) -> list[tuple[float, float, Reading]]:
     """Measurements on the line and along it: position along it (m), value (T)."""
     found = []
     for m in measurements:
@@ -131,7 +131,7 @@ def _on_line(measurements: tuple[Measurement, ...], direction: Floats) -> list[t
     return found
 
 
-def _measured(axes: Axes, measurements: tuple[Measurement, ...], direction: Floats) -> None:
+def _measured(axes: Axes, measurements: tuple[Reading, ...], direction: Floats) -> None:
     points = _on_line(measurements, direction)
     if points:
         axes.plot(
@@ -153,7 +153,7 @@ def _differences(
     model: Field,
     solution: Field | None,
     closed_form: Field | None,
-    measurements: tuple[Measurement, ...],
+    measurements: tuple[Reading, ...],
     direction: Floats,
 ) -> None:
     """Relative distance of every curve from the reference, on a logarithmic axis, where the region is."""

@@ -11,7 +11,7 @@ from scipy.ndimage import binary_dilation
 
 from magfem.fields import Shell
 from magfem.fields.region import SampledRegion
-from magfem.fitting.located_errors import bounds
+from magfem.fields.region_parts import bounding_box
 from magfem.report.figures.style import BLUE, GREY
 from magfem.typing import Booleans, Floats, Points
 
@@ -63,7 +63,7 @@ class Cut:
 
 def cuts(region: SampledRegion) -> tuple[Cut, Cut]:
     """The xz plane and the yz plane through a region; of a flat one the xz plane and the nearest xy plane."""
-    low, high = bounds(region)
+    low, high = bounding_box(region)
     middle = 0.5 * (low + high)
     if isinstance(region, Shell):  # through the device
         middle = np.clip(np.zeros(3), low, high)

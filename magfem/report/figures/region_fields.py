@@ -12,8 +12,9 @@ from matplotlib.figure import Figure
 
 from magfem.fields import Field, Shell
 from magfem.fields.region import SampledRegion
+from magfem.fields.region_parts import bounding_box
 from magfem.fitting import FieldModel, Validation
-from magfem.fitting.located_errors import bounds, distance_in, largest_sizes, middle, sizes
+from magfem.fitting.located_errors import distance_in, largest_sizes, middle, sizes
 from magfem.report.figures.cuts import MILLI, Cut, draw_region, frame_cut, tiles
 from magfem.report.figures.style import (
     BLUE,
@@ -217,7 +218,7 @@ class RegionLine:
 
 def region_lines(region: SampledRegion) -> tuple[RegionLine, ...]:
     """The lines along z and x through the device, or a workspace's middle, as far as they meet the region."""
-    low, high = bounds(region)
+    low, high = bounding_box(region)
     through = np.clip(np.zeros(3), low, high) if isinstance(region, Shell) else middle(region)
     found = []
     for axis in (2, 0):

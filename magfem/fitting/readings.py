@@ -1,18 +1,20 @@
-"""Single measured components of B, one by one: the `[[measurement]]` tables of recipes."""
+"""Readings, single measured components of B, one by one: the `[[measurement]]` tables of recipes."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from magfem.geometry.card import Table
+from magfem.geometry.limits import InvalidValue
 from magfem.typing import Floats
 from magfem.units import describe
 
 
 @dataclass(frozen=True, eq=False)
-class Measurement:
+class Reading:
     """One component of B, measured at one place in the device's frame."""
 
     position: Floats  # (3,) m
@@ -22,23 +24,25 @@ class Measurement:
     source: str
 
 
-def measurements_from_table(table: Table) -> tuple[Measurement, ...]:
-    """The measurements of a recipe, which may have none. Raises CardError."""
-    return tuple(_measurement(entry) for entry in _entries(table, "measurement"))
+def check_readings(readings: Sequence[Reading]) -> None:
+    """Raise InvalidValue where nothing says how sure a factor made of them is."""
+    known = [one.uncertainty is not None for one in readings]
+    for number, one in enumerate(readings):
+        key = f"measurement[{number}].uncertainty"
+        if not known[number] and len(readings) == 1:
+            raise InvalidValue("a scale from a single measurement needs its uncertainty", key)
+        if not known[number] and any(known):
+            raise InvalidValue("either all measurements have an uncertainty or none: they cannot be weighed else", key)
+        if not known[number] and one.value == 0:
+            raise InvalidValue("a measurement of zero needs an uncertainty: it cannot be weighed by its size", key)
 
 
-def _entries(table: Table, key: str) -> list[Table]:
-    """The tables of an array `[[key]]`, each named `key[0]`, `key[1]`, … in messages."""
-    entries = table.values.get(key, [])
-    if not isinstance(entries, list):
-        raise table.error(f"{key} must be a list of tables, [[{key}]], got {describe(entries)}", key)
-    for number, entry in enumerate(entries):
-        if not isinstance(entry, dict):
-            raise table.error(f"{key} must be a list of tables, got {describe(entry)} in it", f"{key}[{number}]")
-    return [Table(table.origin, entry, table.dotted(f"{key}[{n}]")) for n, entry in enumerate(entries)]
+def readings_from_table(table: Table) -> tuple[Reading, ...]:
+    """The readings of a recipe, which may have none. Raises CardError."""
+    return tuple(_reading(entry) for entry in table.tables("measurement")) if "measurement" in table else ()
 
 
-def _measurement(entry: Table) -> Measurement:
+def _reading(entry: Table) -> Reading:
     entry.only("position", "direction", "value", "uncertainty", "source")
     direction = np.array([_number(entry, "direction", part) for part in _three(entry, "direction")])
     if not 0 < np.linalg.norm(direction) < np.inf:
@@ -46,7 +50,7 @@ def _measurement(entry: Table) -> Measurement:
     uncertainty = entry.quantity("uncertainty", "flux density") if "uncertainty" in entry else None
     if uncertainty is not None and uncertainty <= 0:
         raise entry.error("uncertainty must be positive", "uncertainty")
-    return Measurement(
+    return Reading(
         position=np.array([_length(entry, part) for part in _three(entry, "position")]),
         direction=direction / np.linalg.norm(direction),
         value=entry.quantity("value", "flux density"),

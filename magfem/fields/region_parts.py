@@ -1,4 +1,4 @@
-"""Regions taken apart, as other programs are told of them: shells, balls and boxes, each in its place."""
+"""Regions taken apart: shells, balls and boxes, each in its place; the box about them, points in them."""
 
 from __future__ import annotations
 
