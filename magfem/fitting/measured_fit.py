@@ -15,6 +15,7 @@ from magfem.fields.workspace_region import Ball, Box
 from magfem.fitting.alignment import alignment_of
 from magfem.fitting.candidate import Candidate, Displaceable
 from magfem.fitting.families import SAMPLE_FAMILIES, family_of, members, sample_members, suitable_families
+from magfem.fitting.field_fit import fit_field
 from magfem.fitting.held_out import Tried, predicted, smallest_of_the_best
 from magfem.fitting.measured_report import measured_report
 from magfem.fitting.measurement import Measurement, solve_measurement
@@ -136,10 +137,8 @@ def _as_near_as(samples: Samples, geometry: Geometry) -> Shell:
 
 def _device(geometry: Geometry, recipe: Recipe) -> Candidate:
     """The device's own solved and fitted field, with one factor."""
-    from magfem.fitting.fit import fit  # which itself hands samples on to this module
-
     solution = solve(geometry, recipe.dimension, recipe.resolution)
-    model = fit(solution, Recipe(geometry=geometry, region=recipe.region, circuit=recipe.circuit))
+    model = fit_field(solution, Recipe(geometry=geometry, region=recipe.region, circuit=recipe.circuit))
     parameter = np.zeros(model.lowered.coefficient.size, dtype=np.int64)
     return Candidate(DEVICE, f"the device's own field, {model.report['label']}", model.lowered, parameter)
 
