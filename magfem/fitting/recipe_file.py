@@ -110,8 +110,19 @@ def _options(table: Table) -> dict[str, Any]:
     options = dict(table.values)
     for key in options:
         if key in OPTIONS and OPTIONS[key].length:
-            options[key] = three_lengths(table, key) if key == "centre" else table.quantity(key, "length")
+            options[key] = _length_option(table, key)
     return options
+
+
+def _length_option(table: Table, key: str) -> Any:
+    if key == "centre":
+        return three_lengths(table, key)
+    if key == "centres":
+        value = table.value(key)
+        if not isinstance(value, list):
+            raise table.error(f'centres must be a list of triples such as ["1 mm", "0 mm", "0 mm"], got {value!r}', key)
+        return [three_lengths(Table(table.origin, {key: one}, table.path), key) for one in value]
+    return table.quantity(key, "length")
 
 
 def _region(table: Table, device: Shell) -> Shell:

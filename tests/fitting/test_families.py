@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import magfem
+from magfem.constants import MU_0
 from magfem.errors import InputError
 from magfem.fields.norms import relative_errors
 from magfem.fields.term_kinds import LOOP
@@ -222,3 +223,15 @@ def test_skew_magnets_take_both_orders(skew):
 def test_families_refuse_what_they_are_not_made_for(rotor):
     with pytest.raises(InputError, match="need axial magnetisation"):
         next(wall_and_face_loops(rotor, rotor.region))
+
+
+@pytest.mark.parametrize("name", ["magnet_assembly_quadrupole", "halbach_array_5"])
+def test_harmonics_about_bodies_describe_assemblies(name):
+    """Against the closed forms of rigid blocks, at points that were not fitted."""
+    geometry = magfem.load_geometry(name)
+    field = magfem.exact(geometry)
+    model = magfem.fit(field)
+    assert model.report["family"] == "body_harmonics"
+    points = geometry.region.layers(np.random.default_rng(5), 40, 30)
+    assert relative_errors(model.B(points), field.B(points)).max() < 2e-4
+    assert np.linalg.norm(model.moment - geometry.moment) <= 1e-4 * np.abs(geometry.bodies[0].volume / MU_0)

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import magpylib
 import numpy as np
 import pytest
 
@@ -340,3 +341,22 @@ def test_samples_that_say_nothing_of_most_terms_ask_for_a_symmetry() -> None:
         magfem.fit(Samples(line, B, 1e-6))
     axial = magfem.fit(Samples(line, B, 1e-6), Recipe(family="interior_harmonics", options={"symmetry": "axial"}))
     np.testing.assert_allclose(axial.B(line)[:, 2], cubic(line)[0][:, 2], atol=5e-6)
+
+
+def test_two_unknown_magnets_take_two_centres() -> None:
+    """Expansions about both magnets describe what none about the middle between them does."""
+    places = np.array([[-6e-3, 0, 0], [6e-3, 2e-3, 0]])
+    magnets = [
+        magpylib.magnet.Cuboid(dimension=(3e-3, 3e-3, 2e-3), polarization=turn, position=place)
+        for turn, place in zip([(0.3, 0, 1.0), (0, 1.1, 0)], places, strict=True)
+    ]
+    rng = np.random.default_rng(3)
+    points = rng.uniform(-20e-3, 20e-3, (700, 3))
+    points = points[np.linalg.norm(points[:, None] - places, axis=2).min(axis=1) > 7e-3]
+    B = magpylib.getB(magnets, points, sumup=True)
+    samples = Samples(points, B + 1e-6 * rng.normal(size=B.shape), 1e-6)
+    options = {"centres": places.tolist(), "radius": 3e-3}
+    both = magfem.fit(samples, Recipe(family="exterior_harmonics", options=options))
+    assert both.report["heldout"]["B"]["absolute_rms"] < 4e-6
+    with pytest.raises(ConvergenceError, match="describes these samples"):
+        magfem.fit(samples, Recipe(family="exterior_harmonics", options={"radius": 8e-3, "degrees": (1, 2, 3, 4, 5)}))

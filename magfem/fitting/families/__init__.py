@@ -17,12 +17,12 @@ from magfem.fitting.families.charged_faces import charged_faces
 from magfem.fitting.families.closed_paths import closed_paths
 from magfem.fitting.families.coaxial_loops import wall_and_face_loops, winding_loops
 from magfem.fitting.families.free import exterior_harmonics, interior_harmonics
-from magfem.fitting.families.harmonics import solid_harmonics
+from magfem.fitting.families.harmonics import body_harmonics, solid_harmonics
 from magfem.fitting.families.multipoles import axial_multipole, displaced_multipoles, eight_source
 from magfem.fitting.families.oblate import oblate_discs
 from magfem.fitting.families.options import OPTIONS, shown
 from magfem.fitting.families.tubes import cylinder_of, tubes_of
-from magfem.geometry import Coil, Geometry
+from magfem.geometry import Coil, Geometry, MagneticSolids
 from magfem.geometry.circuit import CoaxialWinding
 from magfem.geometry.limits import InvalidValue
 from magfem.samples import Samples
@@ -34,6 +34,7 @@ FAMILIES: dict[str, Callable[..., Iterator[Member]]] = {
     "winding_loops": winding_loops,
     "closed_paths": closed_paths,
     "solid_harmonics": solid_harmonics,
+    "body_harmonics": body_harmonics,
     "oblate_discs": oblate_discs,
     "charged_faces": charged_faces,
     "axial_multipole": axial_multipole,
@@ -83,7 +84,10 @@ def family_of(geometry: Geometry) -> str:
     if isinstance(geometry, Coil):
         parts = [part for circuit in geometry.circuits for part in circuit.parts]
         return "winding_loops" if all(isinstance(part, CoaxialWinding) for part in parts) else "closed_paths"
-    return "wall_and_face_loops" if geometry.axisymmetric and tubes_of(geometry) else "solid_harmonics"
+    if geometry.axisymmetric and tubes_of(geometry):
+        return "wall_and_face_loops"
+    several = isinstance(geometry, MagneticSolids) and len(geometry.parts) > 1 and not geometry.axisymmetric
+    return "body_harmonics" if several else "solid_harmonics"
 
 
 def suitable_families(geometry: Geometry) -> list[str]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from magfem.errors import InputError
 from magfem.fields.term_kinds import HARMONIC, INTERIOR
-from magfem.fields.terms import Terms, harmonics
+from magfem.fields.terms import Terms, concatenate, harmonics
 from magfem.fitting.candidate import Candidate, independent
 from magfem.fitting.families.harmonics import all_orders
 from magfem.fitting.families.options import SYMMETRIES, several
@@ -37,20 +37,22 @@ def interior_harmonics(
 def exterior_harmonics(
     samples: Samples,
     centre: ArrayLike = (0.0, 0.0, 0.0),
+    centres: Sequence[ArrayLike] | None = None,
     radius: float | None = None,
     degrees: Sequence[int] | int = (1, 2, 3, 4, 5, 6, 8, 10),
     symmetry: str = "none",
 ) -> Iterator[Candidate]:
-    """Exterior solid harmonics: samples around a source about `centre` (m), or beside it.
+    """Exterior solid harmonics: samples around a source about `centre` (m), or beside it; or several, about `centres`.
 
     radius: reference, m; by default that of the nearest sample.  degrees: the highest, or several to try.
     """
-    middle = np.asarray(centre, dtype=float)
-    distance = np.linalg.norm(samples.points - middle, axis=1)
+    places = np.array([centre] if centres is None else centres, dtype=float)
+    distance = np.linalg.norm(samples.points[:, None] - places, axis=2)
     reference = float(distance[distance > 0].min()) if radius is None else radius
+    about = "" if len(places) == 1 else f" about each of {len(places)} centres"
     for top in several(degrees):
-        terms = selected(symmetry, range(1, top + 1), reference, middle, HARMONIC)
-        yield independent("exterior_harmonics", f"exterior harmonics up to degree {top}", terms)
+        terms = [selected(symmetry, range(1, top + 1), reference, place, HARMONIC) for place in places]
+        yield independent("exterior_harmonics", f"exterior harmonics up to degree {top}{about}", concatenate(terms))
 
 
 def selected(symmetry: str, degrees: range, radius: float, centre: Floats, kind: int) -> Terms:

@@ -6,14 +6,18 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from magfem.errors import InputError
 from magfem.fields.region import Shell
-from magfem.fields.terms import frame_about, harmonics
+from magfem.fields.terms import concatenate, frame_about, harmonics
 from magfem.fitting.candidate import Candidate, independent
 from magfem.fitting.families.tubes import magnetisation_of, single_part
 from magfem.geometry import Geometry, MagneticSolids
 from magfem.geometry.ball import Ball
 from magfem.geometry.box import Box
 from magfem.typing import Floats
+
+MOST_PARAMETERS = 400
+"""Harmonics about all bodies together."""
 
 
 def solid_harmonics(geometry: Geometry, region: Shell) -> Iterator[Candidate]:
@@ -41,6 +45,27 @@ def solid_harmonics(geometry: Geometry, region: Shell) -> Iterator[Candidate]:
         degrees = range(1, highest + 1, 2)
         kinds = [(n, m, False) for n in degrees for m in (0, 1) if (axial if m == 0 else transverse)]
         yield _harmonics(f"odd degrees up to {highest}", radius, kinds, frame=frame)
+
+
+def body_harmonics(geometry: Geometry, region: Shell) -> Iterator[Candidate]:
+    """Exterior solid harmonics of all orders about the middle of every part of a device of several.
+
+    Unlike those about one centre they converge between the parts and close to them.
+    """
+    if not isinstance(geometry, MagneticSolids):
+        raise InputError(f"{geometry.name}: harmonics about every body are for magnets made of parts")
+    for top in (1, 2, 3, 4, 5, 6, 7):
+        kinds = all_orders(range(1, top + 1))
+        if len(kinds) * len(geometry.parts) > MOST_PARAMETERS:
+            return
+        degrees, orders, sines = (list(column) for column in zip(*kinds, strict=True))
+        terms = [
+            harmonics(part.shape.hull.radius, degrees, orders, sines, np.ones(len(kinds)), np.array(part.position))
+            for part in geometry.parts
+        ]
+        yield independent(
+            "body_harmonics", f"degrees up to {top} about each of {len(terms)} bodies", concatenate(terms)
+        )
 
 
 def _zonal(geometry: Geometry) -> Iterator[Candidate]:

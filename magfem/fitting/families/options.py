@@ -83,6 +83,10 @@ def _is_point(value: Any) -> bool:
     return isinstance(value, list | tuple | np.ndarray) and len(value) == 3 and all(map(is_number, value))
 
 
+def _are_points(value: Any) -> bool:
+    return isinstance(value, list | tuple | np.ndarray) and 0 < len(value) <= MOST and all(map(_is_point, value))
+
+
 OPTIONS: dict[str, Rule] = {
     "poles": _one("poles", HIGHEST_DEGREE),
     "height": Rule(is_number, "height must be a finite number of metres", length=True),
@@ -94,6 +98,7 @@ OPTIONS: dict[str, Rule] = {
     "degrees": _some("degrees", HIGHEST_DEGREE),
     "rings": _some("rings", MOST),
     "centre": Rule(_is_point, "centre must be three finite numbers of metres", length=True),
+    "centres": Rule(_are_points, f"centres must be 1 to {MOST} triples of finite numbers of metres", length=True),
     "radius": Rule(
         lambda value: is_number(value) and value > 0, "radius must be a positive number of metres", length=True
     ),
