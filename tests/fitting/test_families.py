@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -17,6 +18,7 @@ from magfem.fields.terms_json import terms_from_list
 from magfem.fitting.families import (
     FAMILIES,
     axial_multipole,
+    body_harmonics,
     dissertation_families,
     eight_source,
     family_of,
@@ -225,9 +227,9 @@ def test_families_refuse_what_they_are_not_made_for(rotor):
         next(wall_and_face_loops(rotor, rotor.region))
 
 
-@pytest.mark.parametrize("name", ["magnet_assembly_quadrupole", "halbach_array_5"])
+@pytest.mark.parametrize("name", ["magnet_assembly_quadrupole", "halbach_array_5", "halbach_ring_8"])
 def test_harmonics_about_bodies_describe_assemblies(name):
-    """Against the closed forms of rigid blocks, at points that were not fitted."""
+    """Against the closed forms of rigid blocks and cylinder segments, at points that were not fitted."""
     geometry = magfem.load_geometry(name)
     field = magfem.exact(geometry)
     model = magfem.fit(field)
@@ -235,3 +237,10 @@ def test_harmonics_about_bodies_describe_assemblies(name):
     points = geometry.region.layers(np.random.default_rng(5), 40, 30)
     assert relative_errors(model.B(points), field.B(points)).max() < 2e-4
     assert np.linalg.norm(model.moment - geometry.moment) <= 1e-4 * np.abs(geometry.bodies[0].volume / MU_0)
+
+
+def test_many_bodies_share_one_centre():
+    ring = magfem.load_geometry("halbach_ring_16")
+    assert family_of(ring) == "solid_harmonics"
+    with pytest.raises(InputError, match="at most 133 parts, this has 140"):
+        next(body_harmonics(replace(ring, segments=140), ring.region))

@@ -17,7 +17,7 @@ from magfem.fitting.families.charged_faces import charged_faces
 from magfem.fitting.families.closed_paths import closed_paths
 from magfem.fitting.families.coaxial_loops import wall_and_face_loops, winding_loops
 from magfem.fitting.families.free import exterior_harmonics, interior_harmonics
-from magfem.fitting.families.harmonics import body_harmonics, solid_harmonics
+from magfem.fitting.families.harmonics import MOST_BODIES, body_harmonics, solid_harmonics
 from magfem.fitting.families.multipoles import axial_multipole, displaced_multipoles, eight_source
 from magfem.fitting.families.oblate import oblate_discs
 from magfem.fitting.families.options import OPTIONS, shown
@@ -86,8 +86,8 @@ def family_of(geometry: Geometry) -> str:
         return "winding_loops" if all(isinstance(part, CoaxialWinding) for part in parts) else "closed_paths"
     if geometry.axisymmetric and tubes_of(geometry):
         return "wall_and_face_loops"
-    several = isinstance(geometry, MagneticSolids) and len(geometry.parts) > 1 and not geometry.axisymmetric
-    return "body_harmonics" if several else "solid_harmonics"
+    few = isinstance(geometry, MagneticSolids) and 1 < len(geometry.parts) <= MOST_BODIES
+    return "body_harmonics" if few and not geometry.axisymmetric else "solid_harmonics"
 
 
 def suitable_families(geometry: Geometry) -> list[str]:

@@ -19,6 +19,9 @@ from magfem.typing import Floats
 MOST_PARAMETERS = 400
 """Harmonics about all bodies together."""
 
+MOST_BODIES = 8
+"""More leave too few harmonics to each: those about one centre are then nearer."""
+
 
 def solid_harmonics(geometry: Geometry, region: Shell) -> Iterator[Candidate]:
     """Exterior solid harmonics about the centre of the ball around the device.
@@ -48,20 +51,28 @@ def solid_harmonics(geometry: Geometry, region: Shell) -> Iterator[Candidate]:
 
 
 def body_harmonics(geometry: Geometry, region: Shell) -> Iterator[Candidate]:
-    """Exterior solid harmonics of all orders about the middle of every part of a device of several.
+    """Exterior solid harmonics of all orders about the middle of the box around every part of a device of several.
 
     Unlike those about one centre they converge between the parts and close to them.
     """
     if not isinstance(geometry, MagneticSolids):
         raise InputError(f"{geometry.name}: harmonics about every body are for magnets made of parts")
+    if 3 * len(geometry.parts) > MOST_PARAMETERS:
+        raise InputError(
+            f"{geometry.name}: harmonics about every body are for at most {MOST_PARAMETERS // 3} parts, "
+            f"this has {len(geometry.parts)}; solid_harmonics are for more"
+        )
+    boxes = [(part.corners.min(axis=0), part.corners.max(axis=0)) for part in geometry.parts]
     for top in (1, 2, 3, 4, 5, 6, 7):
         kinds = all_orders(range(1, top + 1))
         if len(kinds) * len(geometry.parts) > MOST_PARAMETERS:
             return
         degrees, orders, sines = (list(column) for column in zip(*kinds, strict=True))
         terms = [
-            harmonics(part.shape.hull.radius, degrees, orders, sines, np.ones(len(kinds)), np.array(part.position))
-            for part in geometry.parts
+            harmonics(
+                float(np.linalg.norm(high - low)) / 2, degrees, orders, sines, np.ones(len(kinds)), (low + high) / 2
+            )
+            for low, high in boxes
         ]
         yield independent(
             "body_harmonics", f"degrees up to {top} about each of {len(terms)} bodies", concatenate(terms)
