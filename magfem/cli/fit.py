@@ -172,7 +172,9 @@ def _scale_rows(scale: dict[str, Any]) -> list[tuple[str, str]]:
 
 def _measured_rows(report: dict[str, Any]) -> list[tuple[str, str]]:
     """What a fit of samples found besides the model."""
-    found, uncertainty, heldout = report["measurement"], report["uncertainty"], report["heldout"]["B"]
+    from magfem.fitting.found_parameters import found_parameters
+
+    uncertainty, heldout = report["uncertainty"], report["heldout"]["B"]
     residual = format_quantity(heldout["absolute_rms"], "flux density")
     noise, beyond = (format_quantity(uncertainty[key], "flux density") for key in ("noise", "model_error"))
     rows = [
@@ -181,29 +183,11 @@ def _measured_rows(report: dict[str, Any]) -> list[tuple[str, str]]:
     ]
     if uncertainty["bias_dominates"]:
         rows.append(("", "the model's own error is larger than the noise: deviations say too little"))
-    for name, one in found["free"].items():
-        rows.append((name, _with_deviation(one["value"], one["deviation"], _dimension(name))))
-    for name, dimension in (("remanence", "flux density"), ("current", "current")):
-        if name in found:
-            rows.append((name, _with_deviation(found[name]["value"], found[name]["deviation"], dimension)))
-    if "background" in found:
-        rows.append(("background", ", ".join(format_quantity(b, "flux density") for b in found["background"]["value"])))
+    if not uncertainty["told_apart"]:
+        rows.append(("", "noise and the model's own error are not told apart: state sigma, and look at the residuals"))
+    for name, value, note in found_parameters(report["measurement"]):
+        rows.append((name, f"{value}, {note}" if note else value))
     return rows
-
-
-def _with_deviation(value: float, deviation: float | None, dimension: str) -> str:
-    """A free parameter as people read it."""
-    shown = format_quantity(value, dimension) if dimension else f"{value:.6g}"
-    if deviation is None:
-        return f"{shown}, cannot be told from the coefficients"
-    return f"{shown} ± {format_quantity(deviation, dimension) if dimension else f'{deviation:.2g}'}"
-
-
-def _dimension(name: str) -> str:
-    """What a free parameter is measured in; empty for a factor."""
-    if name.startswith(("tilt", "turn")):
-        return "angle"
-    return "" if name == "gain" else "length"
 
 
 def _row(label: str, family: dict[str, Any], heldout: dict[str, Any]) -> tuple[str, ...]:

@@ -37,6 +37,14 @@ NAMES = (*(name for group in GROUPS.values() for name in group), "gain")
 ALIASES = {"height": "centre_z"}
 
 
+def dimension_of(name: str) -> str:
+    """What a free parameter, or a group of them, is measured in; empty for a factor."""
+    stem = ALIASES.get(name, name).partition("_")[0].rstrip("s")
+    if stem in LENGTHS:
+        return "length"
+    return "angle" if stem in ANGLES else ""
+
+
 @dataclass(frozen=True)
 class Alignment:
     """Which parameters of a measurement are free, and within which bounds.

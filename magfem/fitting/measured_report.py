@@ -199,9 +199,15 @@ def _uncertainty(tried: list[Tried], chosen: Tried) -> dict[str, Any]:
         ]
         noise = float(np.sqrt(min([*left, float(spread) ** 2])))
     beyond = float(np.sqrt(max(float(spread) ** 2 - noise**2, 0.0)))
+    told_apart = stated or len(tried) > 1  # one model alone cannot say which part of what it leaves is its own
     return {
         "noise": noise * typical,
-        "noise_from": "the samples' deviations" if stated else "what the richest candidates leave",
+        "noise_from": "the samples' deviations"
+        if stated
+        else "what the richest candidates leave"
+        if told_apart
+        else "what the only candidate leaves",
+        "told_apart": told_apart,
         "model_error": beyond * typical,
         "standardised_residual": float(spread / noise) if noise > 0 else None,
         "bias_dominates": bool(beyond > noise),

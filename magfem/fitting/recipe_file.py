@@ -10,7 +10,7 @@ from typing import Any
 
 from magfem.errors import CardError, InputError
 from magfem.fields.region import Shell
-from magfem.fitting.alignment import ANGLES, LENGTHS, alignment_of
+from magfem.fitting.alignment import alignment_of, dimension_of
 from magfem.fitting.families.options import OPTIONS
 from magfem.fitting.readings import readings_from_table
 from magfem.fitting.recipe import Recipe, SamplesFile, complaint_about
@@ -157,7 +157,7 @@ def _free(table: Table) -> dict[str, tuple[float, float] | None]:
     """Free parameters: true for sensible bounds, a quantity for either way, or a pair."""
     free: dict[str, tuple[float, float] | None] = {}
     for name, value in table.values.items():
-        dimension = _dimension(name)
+        dimension = dimension_of(name)
         if value is True:
             free[name] = None
         elif isinstance(value, list):
@@ -174,14 +174,6 @@ def _free(table: Table) -> dict[str, tuple[float, float] | None]:
         except InputError as error:
             raise table.error(str(error), name) from None
     return free
-
-
-def _dimension(name: str) -> str:
-    """What a free parameter is measured in; empty for a factor."""
-    stem = name.partition("_")[0].rstrip("s")
-    if stem in LENGTHS or name == "height":
-        return "length"
-    return "angle" if stem in ANGLES else ""
 
 
 def _pair(table: Table, key: str, dimension: str, expected: str, fewest: int = 1) -> tuple[float, float]:

@@ -12,7 +12,7 @@ from magfem.fields import Shell
 from magfem.fields.region import SampledRegion
 from magfem.fields.region_parts import bounding_box
 from magfem.fitting import FieldModel, validate
-from magfem.fitting.alignment import ANGLES
+from magfem.fitting.found_parameters import found_parameters
 from magfem.fitting.located_errors import middle
 from magfem.geometry import Coil, Magnets, PermanentMagnet, describe
 from magfem.report import measured, numbers
@@ -71,7 +71,7 @@ def context(subject: Subject) -> dict[str, Any]:
         "coil": _coil_evidence(model),
         "rows": _coefficient_rows(model),
         "found": report.get("measurement"),
-        "free": _free_rows(model),
+        "found_parameters": found_parameters(report["measurement"]) if report.get("measurement") else [],
         "uncertainty": report.get("uncertainty"),
         "judged": _judged(subject),
         "measured": _measured(subject),
@@ -201,43 +201,6 @@ def _coefficient_rows(model: FieldModel) -> list[dict[str, Any]]:
             what = f"{prefix}degree {degree}, order {order} {part}"
             rows.append({**place, "what": what, "value": value, "unit": "T"})
     return rows
-
-
-def _free_rows(model: FieldModel) -> list[dict[str, str]]:
-    """What a fit of samples found besides coefficients: free parameters, remanence, background, each ± deviation."""
-    found = model.report.get("measurement") or {}
-    rows = []
-    for name, one in found.get("free", {}).items():
-        shown = _with_deviation(one["value"], one["deviation"], _dimension(name))
-        notes = ["at the limit of its bounds"] if one.get("at_bound") else []
-        if one["deviation"] is None:
-            notes.append("cannot be told from the coefficients")
-        rows.append({"name": name.replace("_", " "), "value": shown, "note": ", ".join(notes)})
-    if "remanence" in found:
-        one = found["remanence"]
-        shown = _with_deviation(one["value"], one["deviation"], "flux density")
-        rows.append({"name": "remanence", "value": shown, "note": ""})
-    if "background" in found:
-        one = found["background"]
-        for axis, value, deviation in zip("xyz", one["value"], one["deviation"], strict=True):
-            shown = _with_deviation(value, deviation, "flux density")
-            rows.append({"name": f"background, {axis}", "value": shown, "note": ""})
-    return rows
-
-
-def _with_deviation(value: float, deviation: float | None, dimension: str) -> str:
-    """`1.13 mm ± 12 µm`."""
-    shown = format_quantity(value, dimension) if dimension else f"{value:.6g}"
-    if deviation is None:
-        return shown
-    return f"{shown} ± {format_quantity(deviation, dimension) if dimension else f'{deviation:.2g}'}"
-
-
-def _dimension(name: str) -> str:
-    """What a free parameter is measured in; empty for a factor."""
-    if name.startswith(ANGLES):
-        return "angle"
-    return "" if name == "gain" else "length"
 
 
 def _judged(subject: Subject) -> dict[str, Any] | None:

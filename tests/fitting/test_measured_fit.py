@@ -15,6 +15,7 @@ import magfem
 from magfem.errors import ConvergenceError, InputError
 from magfem.fields.workspace_region import Ball, Box
 from magfem.fitting import FieldModel, Recipe
+from magfem.fitting.found_parameters import found_parameters
 from magfem.fitting.held_out import regions
 from magfem.geometry import AXIAL, CylinderMagnet, PermanentMagnet
 from magfem.samples import Samples, read_samples
@@ -306,6 +307,30 @@ def test_scanned_magnet_may_roll_about_its_line(scanned) -> None:
     assert found["degenerate"] == ["centre_y", "tilt_x", "turn_x"]
     assert found["free"]["centre_x"]["deviation"] < 10e-6 and found["free"]["centre_z"]["deviation"] < 10e-6
     assert not any(one["at_bound"] for one in found["free"].values())
+
+
+def test_one_candidate_without_deviations_does_not_tell_noise_from_bias(scanned) -> None:
+    stated = scanned.report["uncertainty"]
+    assert not stated["told_apart"] and not stated["bias_dominates"] and stated["model_error"] == 0.0
+
+
+def test_found_parameters_end_at_the_second_digit_of_their_deviation():
+    """By hand: 0.02139 deg of deviation leave 1.079 deg."""
+    degree = np.pi / 180
+    free = {
+        "turn_y": {"value": 1.07912 * degree, "deviation": 0.0213948 * degree, "at_bound": False},
+        "centre_x": {"value": -7.2087e-4, "deviation": 1.76179e-6, "at_bound": True},
+        "tilt_x": {"value": 0.5 * degree, "deviation": None, "at_bound": False},
+        "gain": {"value": 1.0234567, "deviation": 0.0123, "at_bound": False},
+    }
+    found = found_parameters({"free": free, "remanence": {"value": 1.12564, "deviation": 9.34e-4}})
+    assert [tuple(one) for one in found] == [
+        ("turn y", "1.079 deg ± 0.021 deg", ""),
+        ("centre x", "-720.9 µm ± 1.8 µm", "at the limit of its bounds"),
+        ("tilt x", "0.5 deg", "cannot be told from the coefficients"),
+        ("gain", "1.023 ± 0.012", ""),
+        ("remanence", "1.12564 T ± 930 µT", ""),
+    ]
 
 
 # Refusals
