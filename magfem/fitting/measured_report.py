@@ -113,8 +113,10 @@ def _estimated_errors(
 
 
 def _allowance(fit: MeasuredFit, uncertainty: dict[str, Any]) -> Floats:
-    """What noise may do to every sample (n,), T."""
+    """What noise may do to every sample (n,), T: nothing where it is not told apart from the model's own error."""
     measured = fit.measurement.measured
+    if not uncertainty["told_apart"]:
+        return np.zeros(len(measured))
     if fit.measurement.variance is not None:
         sigma = np.where(measured, fit.measurement.scale, 0.0)
         return _ALLOWED * _norm(sigma, (1,))

@@ -312,6 +312,8 @@ def test_scanned_magnet_may_roll_about_its_line(scanned) -> None:
 def test_one_candidate_without_deviations_does_not_tell_noise_from_bias(scanned) -> None:
     stated = scanned.report["uncertainty"]
     assert not stated["told_apart"] and not stated["bias_dominates"] and stated["model_error"] == 0.0
+    # What is left may all be the model's own: the bound leaves nothing out as noise.
+    assert scanned.report["bound"]["B"] >= scanned.report["training"]["B"]["max"]
 
 
 def test_found_parameters_end_at_the_second_digit_of_their_deviation():
