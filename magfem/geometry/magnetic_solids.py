@@ -76,9 +76,8 @@ class MagneticSolids(Device):
     def default_region(self) -> tuple[float, float]:
         """Clearance and extent (m), rounded to two digits.
 
-        Such magnets are modelled by multipoles about the centre of the ball around them, which want the region to
-        begin at 1.5 times that ball's radius. The extent is 1.5 times the largest dimension, at least twice the
-        clearance.
+        Multipoles about the centre of the ball around them, which model most such magnets, want the region to begin
+        at 1.5 times that ball's radius. The extent is 1.5 times the largest dimension, at least twice the clearance.
         """
         centre, radius = self.ball
         nearest = max(1.5 * radius - _depth(self.corners, centre), radius / 8)
