@@ -2,8 +2,9 @@
 
 A filament of length l along the unit vector e has A = µ0 I/(4π) g e with g = ln((S + l)/(S − l)), where S is the sum of
 the point's distances to its two ends (Hanson and Hirshman, Phys. Plasmas 9, 4410 (2002)). Hence B = µ0 I/(4π) ∇g × e,
-and every derivative of B follows from those of S. S² − l² = 2 (r_a r_b + r_a·r_b) is the denominator of them all; it
-vanishes on the filament itself, where B is infinite.
+and every derivative of B follows from those of S. S² − l² = 2 (r_a r_b + r_a·r_b) = r_a r_b |∇S|² is the denominator of
+them all; it vanishes on the filament itself, where B is infinite. In its first form it cancels beside the wire like the
+square of the distance to it, in its last like the distance.
 
 A filament alone is no circuit: only closed chains of them have a field that obeys Ampère's law.
 """
@@ -87,7 +88,7 @@ def _add_filaments(
     third = np.empty(3)
     for i in range(points.shape[0]):
         for f in range(start.shape[0]):
-            length2 = aa = bb = ab = 0.0
+            length2 = aa = bb = 0.0
             for k in range(3):
                 e[k] = end[f, k] - start[f, k]
                 a[k] = points[i, k] - start[f, k]
@@ -95,15 +96,16 @@ def _add_filaments(
                 length2 += e[k] * e[k]
                 aa += a[k] * a[k]
                 bb += b[k] * b[k]
-                ab += a[k] * b[k]
             length, ra, rb = sqrt(length2), sqrt(aa), sqrt(bb)
+            steepness2 = 0.0
             for k in range(3):
                 e[k] /= length
                 a[k] /= ra
                 b[k] /= rb
                 slope[k] = a[k] + b[k]  # ∇S
+                steepness2 += slope[k] * slope[k]
             total = ra + rb
-            inverse = 0.5 / (ra * rb + ab)  # 1/(S² − l²)
+            inverse = 1.0 / (ra * rb * steepness2)  # 1/(S² − l²)
             scale = MU_0 / (4.0 * pi) * current[f]
             g1 = -2.0 * length * inverse * scale
             B[i, 0] += g1 * (slope[1] * e[2] - slope[2] * e[1])

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from magfem.constants import MU_0
 from magfem.fields.filament import Filaments
 from magfem.fields.terms import loops
-
-MU_0 = 4e-7 * np.pi
 
 
 def polygon(sides: int, radius: float = 0.01) -> Filaments:
@@ -70,3 +69,17 @@ def test_closed_chains_obey_maxwell(points):
 
 def test_moment_is_current_times_area():
     np.testing.assert_allclose(polygon(4).moment, [0, 0, 2 * 0.01**2], atol=1e-18)
+
+
+def test_no_digits_are_lost_beside_the_wire():
+    """µ0 I h/(2π d √(h² + d²)) and its derivatives beside the middle of a wire of length 2h = 2 m, d down to 1 nm."""
+    wire = Filaments(np.array([[-1.0, 0, 0]]), np.array([[1.0, 0, 0]]), np.ones(1))
+    d = np.logspace(-9, 1, 41)
+    points = np.stack([0 * d, d, 0 * d], axis=-1)
+    B, gradient, hessian = wire.jet(points, 2)
+    u = 1 + d**2
+    scale = MU_0 / (2 * np.pi)
+    np.testing.assert_allclose(B[:, 2], scale / (d * np.sqrt(u)), rtol=1e-12)
+    np.testing.assert_allclose(gradient[:, 2, 1], -scale * (1 + 2 * d**2) / (d**2 * u**1.5), rtol=1e-12)
+    second = scale * (2 + 5 * d**2 + 6 * d**4) / (d**3 * u**2.5)
+    np.testing.assert_allclose(hessian[:, 2, 1, 1], second, rtol=1e-11)
