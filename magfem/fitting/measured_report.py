@@ -190,25 +190,21 @@ def _uncertainty(tried: list[Tried], chosen: Tried) -> dict[str, Any]:
     rows = fit.residual.size
     spread = np.sqrt(np.sum(fit.solved.residual**2) / max(rows - fit.solved.effective - fit.theta.size, 1.0))
     typical = float(np.sqrt(np.nanmean(fit.measurement.scale**2)))
-    stated = fit.measurement.variance is not None
-    if stated:
-        noise = 1.0
+    left = [
+        float(np.sum(one.fit.solved.residual**2) / (rows - one.parameters))
+        for one in tried
+        if rows - one.parameters >= max(3, rows // 10)
+    ]
+    if fit.measurement.variance is not None:
+        noise, ground, told_apart = 1.0, "the samples' deviations", True
     else:  # what the richest candidates leave is the noise, as far as anybody can tell
-        left = [
-            float(np.sum(one.fit.solved.residual**2) / (rows - one.parameters))
-            for one in tried
-            if rows - one.parameters >= max(3, rows // 10)
-        ]
         noise = float(np.sqrt(min([*left, float(spread) ** 2])))
+        told_apart = len(left) > 1  # one model alone cannot say which part of what it leaves is its own
+        ground = "what the richest candidates leave" if told_apart else "what the only candidate leaves"
     beyond = float(np.sqrt(max(float(spread) ** 2 - noise**2, 0.0)))
-    told_apart = stated or len(tried) > 1  # one model alone cannot say which part of what it leaves is its own
     return {
         "noise": noise * typical,
-        "noise_from": "the samples' deviations"
-        if stated
-        else "what the richest candidates leave"
-        if told_apart
-        else "what the only candidate leaves",
+        "noise_from": ground,
         "told_apart": told_apart,
         "model_error": beyond * typical,
         "standardised_residual": float(spread / noise) if noise > 0 else None,

@@ -28,7 +28,7 @@ def test_centre_of_a_polygon():
     for sides in (3, 4, 7):
         apothem = 0.01 * np.cos(np.pi / sides)
         expected = MU_0 * sides * np.sin(np.pi / sides) / (2 * np.pi * apothem)
-        assert polygon(sides).jet(np.zeros((1, 3)), 0)[0][0, 2] == pytest.approx(expected, rel=1e-12)
+        assert polygon(sides).jet(np.zeros((1, 3)), 0)[0][0, 2] == pytest.approx(expected, rel=1e-12, abs=0.0)
 
 
 def test_polygons_tend_to_the_loop(points):
