@@ -1,0 +1,176 @@
+"""From loads to a stable shape: Newton's method on the potential energy, with damping where it is not convex.
+
+The unknowns are curvatures, in which even a rod that curls up is near a straight one; every accepted step lowers the
+energy, so that no start is too far away. Where the gradient vanishes and the Hessian has negative eigenvalues, the
+shape is a saddle: it is left along the direction of the lowest one. Loads without a potential (a moment that keeps
+its direction, loads that follow the tip) have no energy to lower: there the unbalanced load is lowered instead.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from magfem.rod import chain_kernel
+from magfem.rod.chain import Chain
+from magfem.rod.factored import Factored, Shape, factored, shape_of
+from magfem.rod.loads import Acting, Loads
+from magfem.typing import Floats, Points
+
+TOLERANCE = 1e-10
+"""rad, of the residual."""
+
+_LARGEST_TURN = 1.0  # rad, of any cross-section in one step
+_ROUNDING = 1e-11  # of the energy: smaller changes say nothing
+_ESCAPES = 8
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """Where the iteration ended. outcome: "stable", "unstable", "stalled" (no step lowers the energy or the residual),
+    "iterations" (too many)."""
+
+    factored: Factored
+    iterations: int
+    outcome: str
+
+    @property
+    def converged(self) -> bool:
+        """Whether all loads balance."""
+        return self.outcome in ("stable", "unstable")
+
+
+@dataclass(frozen=True)
+class _Point:
+    shape: Shape
+    acting: Acting
+    energy: float
+
+
+def find_equilibrium(
+    chain: Chain,
+    loads: Loads,
+    R_base: Floats,
+    p_base: Points,
+    start: Floats,
+    tolerance: float = TOLERANCE,
+    most_iterations: int = 400,
+    leave_saddles: bool = True,
+) -> Equilibrium:
+    """The equilibrium that descending from the twists `start` (e, 12) leads to.
+
+    R_base (3, 3), p_base (3,) m: the base's pose.  leave_saddles: go on from an unstable equilibrium to a stable one.
+    """
+
+    def at(twist: Floats) -> _Point:
+        shape = shape_of(chain, twist, R_base, p_base)
+        acting = loads.act(shape.R, shape.p)
+        return _Point(shape, acting, shape.elastic_energy + acting.energy)
+
+    here = at(start)
+    damping, iterations, escapes = 0.0, 0, 0
+    while True:
+        system = factored(chain, here.shape, here.acting, loads.coupled, damping)
+        if system.residual <= tolerance:
+            if damping:
+                system = factored(chain, here.shape, here.acting, loads.coupled)
+                damping = 0.0
+            if system.negative == 0 or not leave_saddles or escapes == _ESCAPES or not loads.conservative:
+                return Equilibrium(system, iterations, "unstable" if system.negative else "stable")
+            escapes += 1
+            here = _leave_saddle(chain, here, loads, at, escapes)
+            continue
+        if iterations == most_iterations:
+            return Equilibrium(system, iterations, "iterations")
+        iterations += 1
+        if loads.conservative and system.chain_negative:
+            damping = max(4 * damping, 1e-3)
+            continue
+        step, moved = (part[..., 0] for part in system.answer(twist_load=-system.gradient[..., None]))
+        slope = float(np.vdot(system.gradient, step))
+        if loads.conservative and slope > 0:  # the remainder has made the Hessian indefinite
+            damping = max(4 * damping, 1e-3)
+            continue
+        turn = float(np.abs(moved[:, :3]).max())
+        length = min(1.0, _LARGEST_TURN / turn) if turn > 0 else 1.0
+        found = _search(here, step, slope, length, at, system, loads)
+        if found is None:
+            if damping > 1e8:
+                return Equilibrium(system, iterations, "stalled")
+            damping = max(16 * damping, 1e-2)
+            continue
+        here, taken = found
+        damping = damping / 8 if taken == 1.0 else damping if taken > 0.2 else max(4 * damping, 1e-3)
+        if damping < 1e-4:
+            damping = 0.0
+
+
+def _search(
+    here: _Point, step: Floats, slope: float, length: float, at, system: Factored, loads: Loads
+) -> tuple[_Point, float] | None:
+    """A point along the step that is good enough, and how much of it was taken; None when there is none."""
+    scale = system.chain.bending_scale
+    for _ in range(5):
+        there = at(here.shape.twist + length * step)
+        if loads.conservative:
+            if there.energy <= here.energy + 1e-4 * length * slope:
+                return there, length
+            # At rounding's level, energies cannot tell; the step is then small enough to be trusted.
+            if -slope < _ROUNDING * (scale + abs(here.energy)) and there.energy <= here.energy + _ROUNDING * (
+                scale + abs(here.energy)
+            ):
+                return there, length
+        else:
+            residual = factored(system.chain, there.shape, there.acting, system.coupled).residual
+            if residual < (1 - 1e-4 * length) * system.residual:
+                return there, length
+        length *= 0.25
+    return None
+
+
+def _leave_saddle(chain: Chain, here: _Point, loads: Loads, at, attempt: int) -> _Point:
+    """A point of lower energy along the lowest eigenvector of the Hessian (in the elastic metric)."""
+    damping = 1e-3
+    while True:
+        system = factored(chain, here.shape, here.acting, loads.coupled, damping)
+        if system.chain_negative == 0 and system.negative == 0:
+            break
+        damping *= 2
+    z = np.random.default_rng(attempt).normal(size=here.shape.twist.shape)
+    z[:, [3, 4, 5, 9, 10, 11]] = 0.0
+    moved = np.empty(0)
+    for _ in range(12):
+        z, x = (part[..., 0] for part in system.answer(twist_load=_elastic(chain, z)[..., None]))
+        moved = x[:, :3]
+        z /= np.abs(moved).max()
+    best = here
+    for size in (0.02, 0.1, 0.4):
+        for sign in (1.0, -1.0):
+            there = at(here.shape.twist + sign * size * z)
+            if there.energy < best.energy - 1e-15 * abs(best.energy):
+                best = there
+    return best
+
+
+def _elastic(chain: Chain, twist: Floats) -> Floats:
+    """The elastic Hessian times twists (e, 12)."""
+    spring = np.zeros_like(chain.stiffness)
+    spring[chain.flexible] = chain.stiffness[chain.flexible] / chain.length[chain.flexible, None]
+    a, b = twist[:, :6], twist[:, 6:]
+    own, cross = chain_kernel.OWN, chain_kernel.CROSS
+    return np.concatenate([spring * (own * a + cross * b), spring * (own * b + cross * a)], axis=1)
+
+
+def continued(
+    chain: Chain, loads: Loads, R_base: Floats, p_base: Points, start: Floats, steps: int = 32
+) -> Equilibrium:
+    """The equilibrium that grows from none of the loads to all of them: for loads without a potential."""
+    twist, iterations = start, 0
+    for k in range(1, steps + 1):
+        found = find_equilibrium(chain, replace(loads, factor=loads.factor * k / steps), R_base, p_base, twist)
+        iterations += found.iterations
+        if not found.converged:
+            break
+        twist = found.factored.shape.twist
+    return replace(found, iterations=iterations)

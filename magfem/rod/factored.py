@@ -1,0 +1,168 @@
+"""The energy's Hessian at one shape, factored: how the rod answers to loads, and whether it is stable."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from magfem.rod import chain_kernel
+from magfem.rod.chain import Chain
+from magfem.rod.loads import Acting
+from magfem.typing import Floats, Integers, Points
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """Twists (e, 12) and the poses that follow: R (e + 1, 3, 3), p (e + 1, 3) m of the nodes, and between two screws."""
+
+    twist: Floats
+    R: Floats
+    p: Points
+    R_middle: Floats
+    p_middle: Points
+    elastic_energy: float
+
+
+def shape_of(chain: Chain, twist: Floats, R_base: Floats, p_base: Points) -> Shape:
+    """The shape of a chain that begins at the base's pose."""
+    links = chain.links
+    R, p = np.empty((links + 1, 3, 3)), np.empty((links + 1, 3))
+    R_middle, p_middle = np.empty((links, 3, 3)), np.empty((links, 3))
+    R[0], p[0] = R_base, p_base
+    energy = chain_kernel.shape(
+        chain.flexible, chain.length, chain.stiffness, chain.rest, twist, R, p, R_middle, p_middle
+    )
+    return Shape(twist, R, p, R_middle, p_middle, energy)
+
+
+@dataclass(frozen=True, eq=False)
+class Factored:
+    """H = H₀ + GᵀWG: H₀ as the chain factors it, W the remainder of the coupled nodes, G what they do.
+
+    gradient: (e, 12) of the energy, or minus the unbalanced loads.  resultant: (e + 1, 6) moment, force that the loads
+    from a node on exert about it.  chain_negative: negative eigenvalues of H₀ with its damping.
+    """
+
+    chain: Chain
+    shape: Shape
+    acting: Acting
+    coupled: Integers
+    gradient: Floats
+    B: Floats
+    mixed: Floats
+    gain: Floats
+    pivots: Floats
+    resultant: Floats
+    chain_negative: int
+
+    @cached_property
+    def residual(self) -> float:
+        """Unbalanced loads, as the angle in rad by which they would bend the unloaded rod (elastic energy's norm)."""
+        chain, flexible = self.chain, self.chain.flexible
+        own, cross = chain_kernel.OWN, chain_kernel.CROSS
+        g1, g2 = self.gradient[:, :6], self.gradient[:, 6:]
+        square = (own * (g1 * g1 + g2 * g2) - 2 * cross * g1 * g2) / (own**2 - cross**2)
+        energy = square[flexible] * (chain.length[flexible, None] / chain.stiffness[flexible])
+        return float(np.sqrt(energy.sum() / chain.bending_scale))
+
+    def answer(
+        self, twist_load: Floats | None = None, node_load: Floats | None = None, base: Floats | None = None
+    ) -> tuple[Floats, Floats]:
+        """How twists (e, 12, n) and nodes (e + 1, 6, n) move under small loads.
+
+        twist_load: (e, 12, n) on the twists.  node_load: (e + 1, 6, n) torque, force on the nodes.  base: (6, n)
+        variations of the base's pose.
+        """
+        twist, x = self._chain_answer(twist_load, node_load, base)
+        if self.acting.remainder is None:
+            return twist, x
+        unit_twist, unit_x, _ = self._unit_answers
+        n, size = x.shape[2], len(self.acting.remainder)
+        moved = x[self.coupled].reshape(size, n)
+        extra = np.linalg.solve(self._with_remainder, self.acting.remainder @ moved)
+        return twist - unit_twist @ extra, x - unit_x @ extra
+
+    def _chain_answer(
+        self, twist_load: Floats | None, node_load: Floats | None, base: Floats | None
+    ) -> tuple[Floats, Floats]:
+        given = next(one for one in (twist_load, node_load, base) if one is not None)
+        n, links = given.shape[-1], self.chain.links
+        twist_load = np.zeros((links, 12, n)) if twist_load is None else twist_load
+        node_load = np.zeros((links + 1, 6, n)) if node_load is None else node_load
+        base = np.zeros((6, n)) if base is None else base
+        twist, x = np.zeros((links, 12, n)), np.empty((links + 1, 6, n))
+        chain_kernel.solve(
+            self.chain.flexible,
+            self.shape.p,
+            self.B,
+            self.mixed,
+            self.gain,
+            self.pivots,
+            twist_load,
+            node_load,
+            base,
+            twist,
+            x,
+        )
+        return twist, x
+
+    @cached_property
+    def _unit_answers(self) -> tuple[Floats, Floats, Floats]:
+        """H₀⁻¹Gᵀ: twists (e, 12, 6k), nodes (e + 1, 6, 6k), and of them the coupled nodes' (6k, 6k)."""
+        size = 6 * self.coupled.size
+        load = np.zeros((self.chain.links + 1, 6, size))
+        for k, node in enumerate(self.coupled):
+            load[node, :, 6 * k : 6 * k + 6] = np.eye(6)
+        twist, x = self._chain_answer(None, load, None)
+        return twist, x, x[self.coupled].reshape(size, size)
+
+    @cached_property
+    def _with_remainder(self) -> Floats:
+        """1 + W C, by which (H₀ + GᵀWG)⁻¹ = H₀⁻¹ − H₀⁻¹Gᵀ (1 + W C)⁻¹ W G H₀⁻¹."""
+        assert self.acting.remainder is not None
+        return np.eye(len(self.acting.remainder)) + self.acting.remainder @ self._unit_answers[2]
+
+    @cached_property
+    def negative(self) -> int:
+        """Negative eigenvalues of the Hessian, or of its symmetric part where loads have no potential.
+
+        Of H₀ by the signs of its pivots; with a remainder by Haynsworth's formula for [H₀, Gᵀ, 0; G, 0, −1; 0, −1, W].
+        """
+        if self.acting.remainder is None:
+            return self.chain_negative
+        W, C = self.acting.remainder, self._unit_answers[2]
+        size = len(W)
+        scale = np.sqrt(np.maximum(np.abs(np.diag(C)), np.finfo(float).tiny))
+        C, W = 0.5 * (C + C.T) / np.outer(scale, scale), 0.5 * (W + W.T) * np.outer(scale, scale)
+        small = np.block([[-C, -np.eye(size)], [-np.eye(size), W]])
+        return self.chain_negative + int(np.count_nonzero(np.linalg.eigvalsh(small) < 0)) - size
+
+
+def factored(chain: Chain, shape: Shape, acting: Acting, coupled: Integers, damping: float = 0.0) -> Factored:
+    """Gradient and factored Hessian at a shape under what acts on it; `damping` times the elastic Hessian is added."""
+    links = chain.links
+    gradient, B, mixed = np.zeros((links, 12)), np.empty((links, 6, 12)), np.empty((links, 6, 12))
+    gain, pivots, resultant = np.empty((links, 12, 6)), np.empty((links, 12, 12)), np.empty((links + 1, 6))
+    negative = chain_kernel.factor(
+        chain.flexible,
+        chain.length,
+        chain.stiffness,
+        chain.rest,
+        shape.twist,
+        shape.R,
+        shape.p,
+        shape.R_middle,
+        shape.p_middle,
+        acting.wrench,
+        acting.tangent,
+        damping,
+        gradient,
+        B,
+        mixed,
+        gain,
+        pivots,
+        resultant,
+    )
+    return Factored(chain, shape, acting, coupled, gradient, B, mixed, gain, pivots, resultant, negative)

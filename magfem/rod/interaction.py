@@ -1,0 +1,89 @@
+"""Magnets of one rod among themselves: what every magnet's field does to the dipoles of the others.
+
+The energy of a pair is U = −µ_i·B_j(p_i), with B_j the field of magnet j, fixed to it; where both have a field, half of
+each way round. Moving both magnets together changes nothing, so that the wrench on j follows from that on i by
+balance, and all second derivatives from those of i alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from magfem.errors import InputError
+from magfem.fields.field import Field
+from magfem.typing import Floats, Points
+
+
+@dataclass(frozen=True, eq=False)
+class Interaction:
+    """Fields (m) of the magnets, each in its magnet's own frame, T; and their moments (m, 3) A·m² there."""
+
+    fields: tuple[Field, ...]
+    moments: Floats
+
+    def act(self, R: Floats, p: Points, factor: float = 1.0) -> tuple[float, Floats, Floats]:
+        """Energy J, wrenches (m, 6) torque, force, and the remainder (m, 6, m, 6) as `Loads` wants it.
+
+        R (m, 3, 3), p (m, 3) m of the magnets' centres.
+        """
+        count = len(self.fields)
+        energy, wrench, tangent = 0.0, np.zeros((count, 6)), np.zeros((count, 6, count, 6))
+        for i in range(count):
+            for j in range(count):
+                if i != j:
+                    energy += self._add_pair(i, j, R, p, 0.5 * factor, wrench, tangent)
+        for k in range(count):
+            tangent[k, :3, k, :3] -= 0.5 * _cross(wrench[k, :3])
+        return energy, wrench, tangent
+
+    def _add_pair(
+        self, i: int, j: int, R: Floats, p: Points, factor: float, wrench: Floats, tangent: Floats
+    ) -> float:
+        """The dipole of i in the field of j: adds the wrenches on both, and −∂w/∂x."""
+        local = (p[i] - p[j]) @ R[j]
+        B, G, H = self.fields[j].jet(local, 2, outside="extrapolate")
+        B, G = R[j] @ B, R[j] @ G @ R[j].T
+        mu = factor * (R[i] @ self.moments[i])
+        F = np.einsum("a,abc->bc", R[j].T @ mu, H)
+        F = R[j] @ F @ R[j].T
+        force, torque = G.T @ mu, np.cross(mu, B)
+        own = np.zeros((6, 6))  # ∂w_i/∂x_i
+        own[:3, :3] = np.outer(mu, B) - (mu @ B) * np.eye(3)
+        own[:3, 3:] = _cross(mu) @ G
+        own[3:, :3] = -G.T @ _cross(mu)
+        own[3:, 3:] = F
+        carry = np.eye(6)  # x_i of a motion x_j of the whole pair
+        carry[3:, :3] = -_cross(p[i] - p[j])
+        w = np.concatenate([torque, force])
+        turned = np.zeros((6, 6))  # of w_i when all turns
+        turned[:3, :3], turned[3:, :3] = -_cross(torque), -_cross(force)
+        other = turned - own @ carry  # ∂w_i/∂x_j
+        # w_j = −carryᵀ w_i; carryᵀ holds (p_i − p_j) × force, which moves with both.
+        lever_i, lever_j = np.zeros((6, 6)), np.zeros((6, 6))
+        lever_i[:3, 3:], lever_j[:3, 3:] = -_cross(force), _cross(force)
+        wrench[i] += w
+        wrench[j] -= carry.T @ w
+        tangent[i, :, i, :] -= own
+        tangent[i, :, j, :] -= other
+        tangent[j, :, i, :] += carry.T @ own + lever_i
+        tangent[j, :, j, :] += carry.T @ other + lever_j
+        return float(-mu @ B)
+
+
+def interaction_of(fields: Sequence[Field | None], moments: Floats) -> Interaction:
+    """Of magnets with `fields`; the field of a dipole stands in for None. Raises InputError for a wrong number."""
+    from magfem.fields.dipole_field import DipoleField
+
+    if len(fields) != len(moments):
+        raise InputError(f"the rod has {len(moments)} magnets, and fields of {len(fields)} are given")
+    return Interaction(
+        tuple(DipoleField(moment) if one is None else one for one, moment in zip(fields, moments, strict=True)), moments
+    )
+
+
+def _cross(a: Floats) -> Floats:
+    x, y, z = a
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

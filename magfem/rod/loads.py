@@ -1,0 +1,155 @@
+"""All that acts on a rod: weight, dead loads, magnets in a field, a wrench at the tip, magnets among themselves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from magfem.rod.applied_field import AppliedField
+from magfem.rod.chain import Chain
+from magfem.rod.interaction import Interaction
+from magfem.rod.load_kernel import field_points, node_loads
+from magfem.typing import Floats, Integers, Jet, Points
+
+_ZERO = np.zeros(3)
+
+
+@dataclass(frozen=True, eq=False)
+class Acting:
+    """What the loads do at one shape.
+
+    energy: J, of what has a potential.  wrench: (e + 1, 6) torque, force.  tangent: (e + 1, 6, 6), the symmetric part of
+    −∂wrench/∂x, x = (ω, v).  remainder: (6k, 6k) of the nodes `Loads.coupled`, what the tangents lack; None when there
+    are none.  points: (d, 3) m of the dipoles.  jets: the field there.
+    """
+
+    energy: float
+    wrench: Floats
+    tangent: Floats
+    remainder: Floats | None
+    points: Points
+    jets: Jet
+
+
+@dataclass(frozen=True, eq=False)
+class Loads:
+    """Loads on a chain.
+
+    gravity: (3,) m/s².  tip_force, tip_moment: (3,) N, N·m, in world axes, or in the tip's if `follower`.
+    """
+
+    chain: Chain
+    applied: AppliedField | None = None
+    gravity: Floats = field(default_factory=lambda: np.zeros(3))
+    tip_force: Floats = field(default_factory=lambda: np.zeros(3))
+    tip_moment: Floats = field(default_factory=lambda: np.zeros(3))
+    follower: bool = False
+    interaction: Interaction | None = None
+    factor: float = 1.0  # of all loads, for continuation
+
+    @cached_property
+    def dead_force(self) -> Floats:
+        """(e + 1, 3) N on the nodes."""
+        chain = self.chain
+        force = self.factor * (chain.weight[:, None] * self.gravity + chain.force)
+        if not self.follower:
+            force[-1] += self.factor * self.tip_force
+        return force
+
+    @cached_property
+    def dead_couple(self) -> Floats:
+        """(e + 1, 3) N·m, of −c·(R ẑ)."""
+        return self.factor * (self.chain.axial_weight[:, None] * self.gravity + self.chain.couple)
+
+    @cached_property
+    def dipole_moment(self) -> Floats:
+        """(d, 3) A·m²."""
+        return self.factor * self.chain.dipole_moment
+
+    @cached_property
+    def conservative(self) -> bool:
+        """Whether all loads have a potential: a moment that keeps its direction has none, nor one that follows."""
+        return not (self.tip_moment.any() or (self.follower and self.tip_force.any()) or self.chain.torque.any())
+
+    @cached_property
+    def coupled(self) -> Integers:
+        """(k,) nodes whose loads the symmetric tangents do not describe."""
+        nodes: set[int] = set()
+        if self.chain.torque.any():
+            nodes |= set(np.flatnonzero(self.chain.torque.any(axis=1)).tolist())
+        if self.tip_moment.any() or (self.follower and self.tip_force.any()):
+            nodes.add(self.chain.links)
+        if self.interaction is not None:
+            nodes |= set(self.chain.magnet_node.tolist())
+        return np.array(sorted(nodes), dtype=np.int64)
+
+    def act(self, R: Floats, p: Points) -> Acting:
+        """On nodes of rotations R (e + 1, 3, 3) at p (e + 1, 3)."""
+        chain, nodes = self.chain, p.shape[0]
+        points = np.empty((chain.dipole_node.size if self.applied is not None else 0, 3))
+        wrench, tangent = np.empty((nodes, 6)), np.empty((nodes, 6, 6))
+        if self.applied is not None and points.size:
+            field_points(chain.dipole_node, chain.dipole_offset, R, p, points)
+            jets = self.applied.jets(points)
+        else:
+            jets = _NOTHING
+        energy = node_loads(
+            self.dead_force,
+            self.dead_couple,
+            chain.dipole_node[: len(points)],
+            chain.dipole_offset,
+            self.dipole_moment,
+            R,
+            p,
+            *jets,
+            wrench,
+            tangent,
+        )
+        remainder = None
+        if self.coupled.size:
+            more, remainder = self._beyond(R, p, wrench)
+            energy += more
+        return Acting(energy, wrench, tangent, remainder, points, jets)
+
+    def _beyond(self, R: Floats, p: Points, wrench: Floats) -> tuple[float, Floats]:
+        """Add to `wrench` what has no symmetric tangent of its own; its energy and the coupled nodes' remainder.
+
+        A torque τ that does not turn leaves −½ [τ]× of −∂w/∂x beside the symmetric part that the chain takes, one that
+        turns with its section +½ [τ]×; a force F that turns [F]×.
+        """
+        place = {int(node): k for k, node in enumerate(self.coupled)}
+        W = np.zeros((len(place), 6, len(place), 6))
+        energy = 0.0
+        if self.chain.torque.any():
+            for node in np.flatnonzero(self.chain.torque.any(axis=1)).tolist():
+                torque, k = self.factor * self.chain.torque[node], place[node]
+                wrench[node, :3] += torque
+                W[k, :3, k, :3] -= 0.5 * cross_matrix(torque)
+        tip = self.chain.links
+        if tip in place:
+            k = place[tip]
+            torque, force = self.factor * self.tip_moment, self.factor * self.tip_force
+            if self.follower:
+                torque, force = R[-1] @ torque, R[-1] @ force
+                wrench[-1, 3:] += force
+                W[k, 3:, k, :3] += cross_matrix(force)
+            wrench[-1, :3] += torque
+            W[k, :3, k, :3] += (0.5 if self.follower else -0.5) * cross_matrix(torque)
+        if self.interaction is not None:
+            nodes = self.chain.magnet_node
+            energy, between, tangent = self.interaction.act(R[nodes], p[nodes], self.factor)
+            wrench[nodes] += between
+            at = [place[int(node)] for node in nodes]
+            W[np.ix_(at, range(6), at, range(6))] += tangent
+        return energy, W.reshape(6 * len(place), 6 * len(place))
+
+
+_NOTHING: Jet = (np.empty((0, 3)), np.empty((0, 3, 3)), np.empty((0, 3, 3, 3)))
+
+
+def cross_matrix(a: Floats) -> Floats:
+    """[a]×, (3, 3)."""
+    x, y, z = a
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

@@ -1,0 +1,167 @@
+"""The rod: sections on a base, and the shape they take."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.spatial.transform import RigidTransform
+
+from magfem.errors import ConvergenceError, InputError, OutsideRegionError
+from magfem.rod.sections import FlexibleSection, MagnetSection, three
+from magfem.typing import ArrayLike, Floats
+
+if TYPE_CHECKING:
+    from magfem.fields.field import Field
+    from magfem.rod.applied_field import Driven
+    from magfem.rod.chain import Chain
+    from magfem.rod.state import RodState
+
+Section = FlexibleSection | MagnetSection
+
+
+@dataclass(frozen=True, eq=False, init=False)
+class Rod:
+    """Sections from the base to the tip; the base's +z is the rod's axis.
+
+    sections: one or more, at least one of them flexible.  base: the pose of the rod's beginning in the world.
+    magnet_fields: with it, the magnets act on each other: a field (T, in the magnet's frame) for every MagnetSection,
+    such as its fitted model, or None for a dipole's.
+    """
+
+    sections: tuple[Section, ...]
+    base: RigidTransform = field(default_factory=RigidTransform.identity)
+    magnet_fields: tuple[Field | None, ...] | None = None
+
+    def __init__(
+        self,
+        sections: Sequence[Section],
+        base: RigidTransform | None = None,
+        magnet_fields: Sequence[Field | None] | None = None,
+    ) -> None:
+        base = RigidTransform.identity() if base is None else base
+        if not isinstance(base, RigidTransform) or not base.single:
+            raise InputError("a rod's base is one pose, a scipy.spatial.transform.RigidTransform")
+        if isinstance(sections, FlexibleSection | MagnetSection):
+            raise InputError("a rod takes a list of sections: Rod([section])")
+        for name, value in (
+            ("sections", tuple(sections)),
+            ("base", base),
+            ("magnet_fields", None if magnet_fields is None else tuple(magnet_fields)),
+        ):
+            object.__setattr__(self, name, value)
+        if not any(isinstance(one, FlexibleSection) for one in self.sections):
+            raise InputError("a rod needs at least one FlexibleSection")
+        for k, one in enumerate(self.sections):
+            if not isinstance(one, FlexibleSection | MagnetSection):
+                raise InputError(
+                    f"a rod is made of FlexibleSection and MagnetSection, got {type(one).__name__} as section {k}"
+                )
+        if self.magnet_fields is not None and len(self.magnet_fields) != len(self.magnets):
+            raise InputError(
+                f"the rod has {len(self.magnets)} magnets, and magnet_fields has {len(self.magnet_fields)} entries"
+            )
+
+    @property
+    def magnets(self) -> tuple[MagnetSection, ...]:
+        """Its magnets, from the base to the tip."""
+        return tuple(one for one in self.sections if isinstance(one, MagnetSection))
+
+    @property
+    def length(self) -> float:
+        """m, without load."""
+        return float(sum(one.length for one in self.sections))
+
+    @cached_property
+    def chain(self) -> Chain:
+        """What the kernels work on."""
+        from magfem.rod.chain import chain_of
+
+        return chain_of(self.sections)
+
+    def solve(
+        self,
+        field: Field | Driven | None = None,
+        gravity: ArrayLike = (0.0, 0.0, -9.81),
+        tip_force: ArrayLike = (0.0, 0.0, 0.0),
+        tip_moment: ArrayLike = (0.0, 0.0, 0.0),
+        follower: bool = False,
+        guess: RodState | None = None,
+        *,
+        strict: bool = True,
+        outside: str = "raise",
+        leave_saddles: bool = True,
+        tolerance: float = 1e-10,
+        most_iterations: int = 400,
+    ) -> RodState:
+        """The shape in which all loads balance.
+
+        Parameters
+        ----------
+        field : a Field in T, or (system, currents, joints) of a coil system, or None.
+        gravity : (3,) m/s².
+        tip_force, tip_moment : (3,) N and N·m on the tip; in world axes, or with `follower` in the tip's.
+        guess : the state of a rod with equal sections, to start from; without one, the unloaded shape.
+        strict : False returns a state that did not converge, instead of raising.
+        outside : "raise" when a magnet ends outside the field's region, or "extrapolate".
+        leave_saddles : False returns an unstable equilibrium when Newton's method has found one.
+        tolerance : of the residual, rad.
+
+        Raises InputError for what cannot be used, ConvergenceError (residual, iterations), OutsideRegionError.
+        """
+        from magfem.rod.applied_field import applied_field
+        from magfem.rod.equilibrium import continued, find_equilibrium
+        from magfem.rod.interaction import interaction_of
+        from magfem.rod.loads import Loads
+        from magfem.rod.state import RodState
+
+        if outside not in ("raise", "extrapolate"):
+            raise InputError(f'outside must be "raise" or "extrapolate", got {outside!r}')
+        chain = self.chain
+        interaction = None
+        if self.magnet_fields is not None:
+            interaction = interaction_of(self.magnet_fields, np.array([one.moment_vector for one in self.magnets]))
+        loads = Loads(
+            chain,
+            applied_field(field),
+            three("rod", "gravity", gravity),
+            three("rod", "tip_force", tip_force),
+            three("rod", "tip_moment", tip_moment),
+            follower,
+            interaction,
+        )
+        R, p = self._base
+        start = chain.rest if guess is None else _start(guess, chain)
+        found = find_equilibrium(chain, loads, R, p, start, tolerance, most_iterations, leave_saddles)
+        if not found.converged and not loads.conservative:
+            found = continued(chain, loads, R, p, chain.rest)
+        state = RodState(self, loads, found)
+        if strict and not found.converged:
+            raise ConvergenceError(
+                f"the rod's shape did not converge ({found.outcome}): residual {state.residual:.1e} rad after "
+                f"{found.iterations} iterations; strict=False returns it as it is"
+            )
+        if outside == "raise" and loads.applied is not None and len(found.factored.acting.points):
+            inside = np.asarray(loads.applied.region.contains(found.factored.acting.points))
+            if not inside.all():
+                worst = found.factored.acting.points[np.flatnonzero(~inside)[0]] * 1e3
+                raise OutsideRegionError(
+                    f"a magnet of the rod ends at ({worst[0]:.4g}, {worst[1]:.4g}, {worst[2]:.4g}) mm, outside the "
+                    f"field's region ({loads.applied.region.describe()}); outside=\"extrapolate\" takes it as it is"
+                )
+        return state
+
+    @cached_property
+    def _base(self) -> tuple[Floats, Floats]:
+        return np.ascontiguousarray(self.base.rotation.as_matrix()), np.array(self.base.translation)
+
+
+def _start(guess: RodState, chain: Chain) -> Floats:
+    """The guess's twists."""
+    twist = guess.factored.shape.twist
+    if twist.shape != chain.rest.shape or not np.array_equal(guess.loads.chain.flexible, chain.flexible):
+        raise InputError("guess is the state of a rod with other sections: start without one")
+    return twist
