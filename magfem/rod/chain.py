@@ -67,7 +67,7 @@ def chain_of(sections: Sequence[FlexibleSection | MagnetSection]) -> Chain:
     links: list[tuple[bool, float, int]] = []
     for k, one in enumerate(sections):
         if isinstance(one, FlexibleSection):
-            links += [(True, one.length / one.elements, k)] * one.elements
+            links += [(True, one.length / one.divisions, k)] * one.divisions
         else:
             links += [(False, one.length / 2, k)] * 2
     count = len(links)
@@ -82,9 +82,9 @@ def chain_of(sections: Sequence[FlexibleSection | MagnetSection]) -> Chain:
     begin = 0
     for one in sections:
         if isinstance(one, FlexibleSection):
-            end = begin + one.elements
-            h = one.length / one.elements
-            share = np.full(one.elements + 1, h)
+            end = begin + one.divisions
+            h = one.length / one.divisions
+            share = np.full(one.divisions + 1, h)
             share[[0, -1]] = h / 2
             nodes = slice(begin, end + 1)
             stiffness[begin:end] = one.stiffness
@@ -137,7 +137,7 @@ def chain_of(sections: Sequence[FlexibleSection | MagnetSection]) -> Chain:
 def _rest(one: FlexibleSection, h: float) -> Floats:
     """(elements, 12) the twists of a section's links without load."""
     strain = three("flexible section", "intrinsic_strain", one.intrinsic_strain)
-    where = (np.arange(one.elements)[:, None] + _GAUSS) * h  # (elements, 2)
+    where = (np.arange(one.divisions)[:, None] + _GAUSS) * h  # (elements, 2)
     if callable(one.intrinsic_curvature):
         curvature = np.asarray(one.intrinsic_curvature(where.ravel()), dtype=float)
         if curvature.shape != (where.size, 3) or not np.isfinite(curvature).all():

@@ -23,6 +23,9 @@ import numpy as np
 from magfem.compiled import kernel
 from magfem.typing import Booleans, Floats
 
+NEUTRAL = 1e-9
+"""Of a link's bending stiffness: pivots below count as zero, such as that of a turn which no load resists."""
+
 _TERMS = 12  # of the series in θ²: exact to rounding for links that turn by less than π
 _C1 = np.array([(-1.0) ** k / float(np.prod(np.arange(1.0, 2 * k + 3))) for k in range(_TERMS)])  # (1 − cos θ)/θ²
 _C2 = np.array([(-1.0) ** k / float(np.prod(np.arange(1.0, 2 * k + 4))) for k in range(_TERMS)])  # (θ − sin θ)/θ³
@@ -385,7 +388,7 @@ def factor(
                 Lk[i, i] += OWN * damped
                 Lk[6 + i, 6 + i] += OWN * damped
                 Lk[6 + i, i] += CROSS * damped
-            negative += _eliminate(Lk, mk, Kk)
+            negative += _eliminate(Lk, mk, Kk, NEUTRAL * stiffness[k, :3].max() / length[k])
             for i in range(6):
                 for j in range(i + 1):
                     total = 0.0
@@ -405,10 +408,10 @@ def factor(
 
 
 @kernel
-def _eliminate(L: Floats, mixed: Floats, gain: Floats) -> int:
+def _eliminate(L: Floats, mixed: Floats, gain: Floats, neutral: float) -> int:
     """Factor the lower half of L (12, 12) in place, L D Lᵀ, the diagonal as 1/D; gain = −(L D Lᵀ)⁻¹ mixedᵀ.
 
-    Returns how many pivots are negative. A pivot of exactly zero becomes tiny and positive: the step is then huge,
+    Returns how many pivots are negative and larger than `neutral`. A pivot of exactly zero becomes tiny and positive: the step is then huge,
     and refused.
     """
     negative = 0
@@ -417,7 +420,7 @@ def _eliminate(L: Floats, mixed: Floats, gain: Floats) -> int:
         pivot = L[j, j]
         if pivot == 0.0:
             pivot = 1e-300
-        if pivot < 0.0:
+        if pivot < -neutral:
             negative += 1
         inverse = 1.0 / pivot
         L[j, j] = inverse

@@ -3,12 +3,13 @@
 The unknowns are curvatures, in which even a rod that curls up is near a straight one; every accepted step lowers the
 energy, so that no start is too far away. Where the gradient vanishes and the Hessian has negative eigenvalues, the
 shape is a saddle: it is left along the direction of the lowest one. Loads without a potential (a moment that keeps
-its direction, loads that follow the tip) have no energy to lower: there the unbalanced load is lowered instead.
+its direction, loads that follow the tip) have no energy to lower: there the rod creeps to its equilibrium.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -58,7 +59,7 @@ def find_equilibrium(
     most_iterations: int = 400,
     leave_saddles: bool = True,
 ) -> Equilibrium:
-    """The equilibrium that descending from the twists `start` (e, 12) leads to.
+    """For loads with a potential, the equilibrium that descending from the twists `start` (e, 12) leads to.
 
     R_base (3, 3), p_base (3,) m: the base's pose.  leave_saddles: go on from an unstable equilibrium to a stable one.
     """
@@ -76,7 +77,7 @@ def find_equilibrium(
             if damping:
                 system = factored(chain, here.shape, here.acting, loads.coupled)
                 damping = 0.0
-            if system.negative == 0 or not leave_saddles or escapes == _ESCAPES or not loads.conservative:
+            if system.negative == 0 or not leave_saddles or escapes == _ESCAPES:
                 return Equilibrium(system, iterations, "unstable" if system.negative else "stable")
             escapes += 1
             here = _leave_saddle(chain, here, loads, at, escapes)
@@ -84,17 +85,17 @@ def find_equilibrium(
         if iterations == most_iterations:
             return Equilibrium(system, iterations, "iterations")
         iterations += 1
-        if loads.conservative and system.chain_negative:
+        if system.chain_negative:
             damping = max(4 * damping, 1e-3)
             continue
         step, moved = (part[..., 0] for part in system.answer(twist_load=-system.gradient[..., None]))
         slope = float(np.vdot(system.gradient, step))
-        if loads.conservative and slope > 0:  # the remainder has made the Hessian indefinite
+        if slope > 0:  # the remainder has made the Hessian indefinite
             damping = max(4 * damping, 1e-3)
             continue
         turn = float(np.abs(moved[:, :3]).max())
         length = min(1.0, _LARGEST_TURN / turn) if turn > 0 else 1.0
-        found = _search(here, step, slope, length, at, system, loads)
+        found = _search(here, step, slope, length, at, system)
         if found is None:
             if damping > 1e8:
                 return Equilibrium(system, iterations, "stalled")
@@ -107,29 +108,22 @@ def find_equilibrium(
 
 
 def _search(
-    here: _Point, step: Floats, slope: float, length: float, at, system: Factored, loads: Loads
+    here: _Point, step: Floats, slope: float, length: float, at: Callable[[Floats], _Point], system: Factored
 ) -> tuple[_Point, float] | None:
     """A point along the step that is good enough, and how much of it was taken; None when there is none."""
-    scale = system.chain.bending_scale
+    rounding = _ROUNDING * (system.chain.bending_scale + abs(here.energy))
     for _ in range(5):
         there = at(here.shape.twist + length * step)
-        if loads.conservative:
-            if there.energy <= here.energy + 1e-4 * length * slope:
-                return there, length
-            # At rounding's level, energies cannot tell; the step is then small enough to be trusted.
-            if -slope < _ROUNDING * (scale + abs(here.energy)) and there.energy <= here.energy + _ROUNDING * (
-                scale + abs(here.energy)
-            ):
-                return there, length
-        else:
-            residual = factored(system.chain, there.shape, there.acting, system.coupled).residual
-            if residual < (1 - 1e-4 * length) * system.residual:
-                return there, length
+        if there.energy <= here.energy + 1e-4 * length * slope:
+            return there, length
+        # At rounding's level, energies cannot tell; the step is then small enough to be trusted.
+        if -slope < rounding and there.energy <= here.energy + rounding:
+            return there, length
         length *= 0.25
     return None
 
 
-def _leave_saddle(chain: Chain, here: _Point, loads: Loads, at, attempt: int) -> _Point:
+def _leave_saddle(chain: Chain, here: _Point, loads: Loads, at: Callable[[Floats], _Point], attempt: int) -> _Point:
     """A point of lower energy along the lowest eigenvector of the Hessian (in the elastic metric)."""
     damping = 1e-3
     while True:
@@ -162,15 +156,37 @@ def _elastic(chain: Chain, twist: Floats) -> Floats:
     return np.concatenate([spring * (own * a + cross * b), spring * (own * b + cross * a)], axis=1)
 
 
-def continued(
-    chain: Chain, loads: Loads, R_base: Floats, p_base: Points, start: Floats, steps: int = 32
+def relax(
+    chain: Chain,
+    loads: Loads,
+    R_base: Floats,
+    p_base: Points,
+    start: Floats,
+    tolerance: float = TOLERANCE,
+    most_iterations: int = 400,
 ) -> Equilibrium:
-    """The equilibrium that grows from none of the loads to all of them: for loads without a potential."""
-    twist, iterations = start, 0
-    for k in range(1, steps + 1):
-        found = find_equilibrium(chain, replace(loads, factor=loads.factor * k / steps), R_base, p_base, twist)
-        iterations += found.iterations
-        if not found.converged:
-            break
-        twist = found.factored.shape.twist
-    return replace(found, iterations=iterations)
+    """The equilibrium that an overdamped rod creeps to: for loads without a potential.
+
+    Implicit Euler steps of K dη/dt = −gradient, K the elastic Hessian, each of one Newton iteration; time steps grow as
+    the residual falls, until they are Newton's own (switched evolution relaxation; Kelley & Keyes, SIAM J. Numer. Anal.
+    35 (1998) 508).
+    """
+    twist, damping, before, iterations = start, 1e-2, np.inf, 0
+    while True:
+        shape = shape_of(chain, twist, R_base, p_base)
+        system = factored(chain, shape, loads.act(shape.R, shape.p), loads.coupled, damping)
+        if system.residual <= tolerance:
+            system = factored(chain, shape, system.acting, loads.coupled)
+            return Equilibrium(system, iterations, "unstable" if system.negative else "stable")
+        if iterations == most_iterations:
+            return Equilibrium(system, iterations, "iterations")
+        iterations += 1
+        while system.negative:
+            damping *= 4
+            system = factored(chain, shape, system.acting, loads.coupled, damping)
+        step, moved = (part[..., 0] for part in system.answer(twist_load=-system.gradient[..., None]))
+        turn = float(np.abs(moved[:, :3]).max())
+        twist = twist + min(1.0, _LARGEST_TURN / 2 / max(turn, 1e-300)) * step
+        damping = min(damping * float(np.clip(system.residual / before, 0.1, 2.0)), 1e3) if before < np.inf else damping
+        damping = damping if damping > 1e-9 else 0.0
+        before = system.residual

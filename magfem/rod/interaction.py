@@ -24,7 +24,7 @@ class Interaction:
     fields: tuple[Field, ...]
     moments: Floats
 
-    def act(self, R: Floats, p: Points, factor: float = 1.0) -> tuple[float, Floats, Floats]:
+    def act(self, R: Floats, p: Points) -> tuple[float, Floats, Floats]:
         """Energy J, wrenches (m, 6) torque, force, and the remainder (m, 6, m, 6) as `Loads` wants it.
 
         R (m, 3, 3), p (m, 3) m of the magnets' centres.
@@ -34,19 +34,17 @@ class Interaction:
         for i in range(count):
             for j in range(count):
                 if i != j:
-                    energy += self._add_pair(i, j, R, p, 0.5 * factor, wrench, tangent)
+                    energy += self._add_pair(i, j, R, p, wrench, tangent)
         for k in range(count):
             tangent[k, :3, k, :3] -= 0.5 * _cross(wrench[k, :3])
         return energy, wrench, tangent
 
-    def _add_pair(
-        self, i: int, j: int, R: Floats, p: Points, factor: float, wrench: Floats, tangent: Floats
-    ) -> float:
+    def _add_pair(self, i: int, j: int, R: Floats, p: Points, wrench: Floats, tangent: Floats) -> float:
         """The dipole of i in the field of j: adds the wrenches on both, and −∂w/∂x."""
         local = (p[i] - p[j]) @ R[j]
         B, G, H = self.fields[j].jet(local, 2, outside="extrapolate")
         B, G = R[j] @ B, R[j] @ G @ R[j].T
-        mu = factor * (R[i] @ self.moments[i])
+        mu = 0.5 * (R[i] @ self.moments[i])  # half of each way round
         F = np.einsum("a,abc->bc", R[j].T @ mu, H)
         F = R[j] @ F @ R[j].T
         force, torque = G.T @ mu, np.cross(mu, B)

@@ -47,26 +47,19 @@ class Loads:
     tip_moment: Floats = field(default_factory=lambda: np.zeros(3))
     follower: bool = False
     interaction: Interaction | None = None
-    factor: float = 1.0  # of all loads, for continuation
 
     @cached_property
     def dead_force(self) -> Floats:
         """(e + 1, 3) N on the nodes."""
-        chain = self.chain
-        force = self.factor * (chain.weight[:, None] * self.gravity + chain.force)
+        force = self.chain.weight[:, None] * self.gravity + self.chain.force
         if not self.follower:
-            force[-1] += self.factor * self.tip_force
+            force[-1] += self.tip_force
         return force
 
     @cached_property
     def dead_couple(self) -> Floats:
         """(e + 1, 3) N·m, of −c·(R ẑ)."""
-        return self.factor * (self.chain.axial_weight[:, None] * self.gravity + self.chain.couple)
-
-    @cached_property
-    def dipole_moment(self) -> Floats:
-        """(d, 3) A·m²."""
-        return self.factor * self.chain.dipole_moment
+        return self.chain.axial_weight[:, None] * self.gravity + self.chain.couple
 
     @cached_property
     def conservative(self) -> bool:
@@ -100,7 +93,7 @@ class Loads:
             self.dead_couple,
             chain.dipole_node[: len(points)],
             chain.dipole_offset,
-            self.dipole_moment,
+            chain.dipole_moment,
             R,
             p,
             *jets,
@@ -124,22 +117,22 @@ class Loads:
         energy = 0.0
         if self.chain.torque.any():
             for node in np.flatnonzero(self.chain.torque.any(axis=1)).tolist():
-                torque, k = self.factor * self.chain.torque[node], place[node]
+                torque, k = self.chain.torque[node], place[node]
                 wrench[node, :3] += torque
                 W[k, :3, k, :3] -= 0.5 * cross_matrix(torque)
         tip = self.chain.links
         if tip in place:
             k = place[tip]
-            torque, force = self.factor * self.tip_moment, self.factor * self.tip_force
+            torque = self.tip_moment
             if self.follower:
-                torque, force = R[-1] @ torque, R[-1] @ force
+                torque, force = R[-1] @ torque, (R[-1] @ self.tip_force)
                 wrench[-1, 3:] += force
                 W[k, 3:, k, :3] += cross_matrix(force)
             wrench[-1, :3] += torque
             W[k, :3, k, :3] += (0.5 if self.follower else -0.5) * cross_matrix(torque)
         if self.interaction is not None:
             nodes = self.chain.magnet_node
-            energy, between, tangent = self.interaction.act(R[nodes], p[nodes], self.factor)
+            energy, between, tangent = self.interaction.act(R[nodes], p[nodes])
             wrench[nodes] += between
             at = [place[int(node)] for node in nodes]
             W[np.ix_(at, range(6), at, range(6))] += tangent

@@ -113,7 +113,7 @@ class Rod:
         Raises InputError for what cannot be used, ConvergenceError (residual, iterations), OutsideRegionError.
         """
         from magfem.rod.applied_field import applied_field
-        from magfem.rod.equilibrium import continued, find_equilibrium
+        from magfem.rod.equilibrium import find_equilibrium, relax
         from magfem.rod.interaction import interaction_of
         from magfem.rod.loads import Loads
         from magfem.rod.state import RodState
@@ -135,9 +135,10 @@ class Rod:
         )
         R, p = self._base
         start = chain.rest if guess is None else _start(guess, chain)
-        found = find_equilibrium(chain, loads, R, p, start, tolerance, most_iterations, leave_saddles)
-        if not found.converged and not loads.conservative:
-            found = continued(chain, loads, R, p, chain.rest)
+        if loads.conservative:
+            found = find_equilibrium(chain, loads, R, p, start, tolerance, most_iterations, leave_saddles)
+        else:
+            found = relax(chain, loads, R, p, start, tolerance, most_iterations)
         state = RodState(self, loads, found)
         if strict and not found.converged:
             raise ConvergenceError(

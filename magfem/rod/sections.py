@@ -15,8 +15,8 @@ from magfem.typing import ArrayLike, Floats
 Curvature: TypeAlias = ArrayLike | Callable[[Floats], Floats]
 """(3,) 1/m, or a function of arc length (n,) m from the section's start that gives (n, 3)."""
 
-ELEMENTS = 16
-"""Of a flexible section, by default."""
+ELEMENTS, MAGNETIC_ELEMENTS = 16, 256
+"""Of a flexible section, by default; and of a hard-magnetic one, whose torques act at the nodes."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class FlexibleSection:
     intrinsic_curvature: (3,) 1/m without load, in the section's axes, or a function of arc length; its third component
     is twist.  intrinsic_strain: (3,), dp/ds in the section's axes without load.  force_per_length: (3,) N/m and
     moment_per_length: (3,) N, in world axes, whatever the shape.  magnetic_moment_per_length: (3,) A·m in the section's
-    axes, of a hard-magnetic section.  elements: how many it is divided into; the shape's error falls with their fourth
+    axes, of a hard-magnetic section.  elements: how many it is divided into (default 16, hard-magnetic 256); the shape's error falls with their fourth
     power, that of a hard-magnetic section's torques with their square.
     Source of the constitutive law: dissertation, eq. 2.2; K = diag(EI_x, EI_y, GJ), diag(GA, GA, EA).
     """
@@ -88,7 +88,7 @@ class FlexibleSection:
     force_per_length: ArrayLike = (0.0, 0.0, 0.0)
     moment_per_length: ArrayLike = (0.0, 0.0, 0.0)
     magnetic_moment_per_length: ArrayLike = (0.0, 0.0, 0.0)
-    elements: int = ELEMENTS
+    elements: int | None = None
 
     def __post_init__(self) -> None:
         positive("flexible section", "length", self.length)
@@ -101,7 +101,7 @@ class FlexibleSection:
             positive("flexible section", "shear_modulus", self.shear_modulus)
         if (self.radius is None) == (self.cross_section is None):
             raise InputError("flexible section: state either radius (m) or cross_section")
-        if type(self.elements) is not int or not 2 <= self.elements <= 4096:
+        if self.elements is not None and not (type(self.elements) is int and 2 <= self.elements <= 4096):
             raise InputError(f"flexible section: elements must be a whole number from 2 to 4096, got {self.elements!r}")
         _ = self.section
         if not callable(self.intrinsic_curvature):
@@ -110,6 +110,13 @@ class FlexibleSection:
             three("flexible section", name, getattr(self, name))
         if not three("flexible section", "intrinsic_strain", self.intrinsic_strain)[2] > 0:
             raise InputError("flexible section: intrinsic_strain must point along +z, such as (0, 0, 1)")
+
+    @property
+    def divisions(self) -> int:
+        """How many elements it is divided into."""
+        if self.elements is not None:
+            return self.elements
+        return MAGNETIC_ELEMENTS if np.any(np.asarray(self.magnetic_moment_per_length, float)) else ELEMENTS
 
     @property
     def section(self) -> CrossSection:

@@ -74,7 +74,7 @@ def _of_field(state: RodState, dB: Floats, dG: Floats) -> Floats:
     field_loads(
         chain.dipole_node,
         chain.dipole_offset,
-        state.loads.dipole_moment,
+        chain.dipole_moment,
         state.factored.shape.R,
         np.ascontiguousarray(dB),
         np.ascontiguousarray(dG),
@@ -114,7 +114,7 @@ def _elastic(of_stiffness: Callable[[FlexibleSection], Floats]) -> Callable[[Rod
             assert isinstance(one, FlexibleSection)
             links = chain.section == k
             e = twist[links] - chain.rest[links]
-            spring = of_stiffness(one) / (one.length / one.elements)
+            spring = of_stiffness(one) / (one.length / one.divisions)
             loads[links, :6, column] = -spring * (OWN * e[:, :6] + CROSS * e[:, 6:])
             loads[links, 6:, column] = -spring * (OWN * e[:, 6:] + CROSS * e[:, :6])
         return tuple(f"section {k}" for k in chosen), (loads, None, None)
@@ -137,7 +137,7 @@ def _of_shear_modulus(one: FlexibleSection) -> Floats:
 
 
 def _density(state: RodState) -> tuple[tuple[str, ...], Load]:
-    chain, g = state.loads.chain, state.loads.factor * state.loads.gravity
+    chain, g = state.loads.chain, state.loads.gravity
     chosen = [k for k, one in enumerate(state.rod.sections) if isinstance(one, FlexibleSection)]
     load = np.zeros((chain.links + 1, 6, len(chosen)))
     axis = state.factored.shape.R[:, :, 2]
@@ -167,7 +167,7 @@ def _moment(state: RodState) -> tuple[tuple[str, ...], Load]:
             for d, share in zip(mine.tolist(), shares.tolist(), strict=True):
                 node = chain.dipole_node[d]
                 R = state.factored.shape.R[node]
-                mu = state.loads.factor * share * R  # columns: per component
+                mu = share * R  # columns: per component
                 force = np.einsum("ij,ik->jk", acting.jets[1][d], mu)
                 torque = np.cross(mu.T, acting.jets[0][d]).T + np.cross(R @ chain.dipole_offset[d], force.T).T
                 load[node, :3, 3 * k : 3 * k + 3] += torque
