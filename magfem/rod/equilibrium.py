@@ -19,18 +19,22 @@ from magfem.rod.factored import Factored, Shape, factored, shape_of
 from magfem.rod.loads import Acting, Loads
 from magfem.typing import Floats, Points
 
-TOLERANCE = 1e-10
+TOLERANCE = 1e-9
 """rad, of the residual."""
 
 _LARGEST_TURN = 1.0  # rad, of any cross-section in one step
 _ROUNDING = 1e-11  # of the energy: smaller changes say nothing
 _ESCAPES = 8
+_BLOCKED = 12  # steps in a row that the edge of what is allowed has shortened
 
 
 @dataclass(frozen=True)
 class Equilibrium:
-    """Where the iteration ended. outcome: "stable", "unstable", "stalled" (no step lowers the energy or the residual),
-    "iterations" (too many)."""
+    """Where the iteration ended.
+
+    outcome: "stable", "unstable", "outside" (a magnet is pulled out of the field's region), "stalled" (no step lowers
+    the energy), "iterations" (too many).
+    """
 
     factored: Factored
     iterations: int
@@ -58,10 +62,12 @@ def find_equilibrium(
     tolerance: float = TOLERANCE,
     most_iterations: int = 400,
     leave_saddles: bool = True,
+    allowed: Callable[[Points], bool] | None = None,
 ) -> Equilibrium:
     """For loads with a potential, the equilibrium that descending from the twists `start` (e, 12) leads to.
 
     R_base (3, 3), p_base (3,) m: the base's pose.  leave_saddles: go on from an unstable equilibrium to a stable one.
+    allowed: whether the dipoles may be at points (d, 3) m; they do not leave what is allowed, unless they start outside.
     """
 
     def at(twist: Floats) -> _Point:
@@ -70,7 +76,9 @@ def find_equilibrium(
         return _Point(shape, acting, shape.elastic_energy + acting.energy)
 
     here = at(start)
-    damping, iterations, escapes = 0.0, 0, 0
+    if allowed is not None and not allowed(here.acting.points):
+        allowed = None
+    damping, iterations, escapes, blocked = 0.0, 0, 0, 0
     while True:
         system = factored(chain, here.shape, here.acting, loads.coupled, damping)
         if system.residual <= tolerance:
@@ -95,7 +103,10 @@ def find_equilibrium(
             continue
         turn = float(np.abs(moved[:, :3]).max())
         length = min(1.0, _LARGEST_TURN / turn) if turn > 0 else 1.0
-        found = _search(here, step, slope, length, at, system)
+        found, met_the_edge = _search(here, step, slope, length, at, system, allowed)
+        blocked = blocked + 1 if met_the_edge else 0
+        if blocked == _BLOCKED:
+            return Equilibrium(system, iterations, "outside")
         if found is None:
             if damping > 1e8:
                 return Equilibrium(system, iterations, "stalled")
@@ -108,19 +119,28 @@ def find_equilibrium(
 
 
 def _search(
-    here: _Point, step: Floats, slope: float, length: float, at: Callable[[Floats], _Point], system: Factored
-) -> tuple[_Point, float] | None:
-    """A point along the step that is good enough, and how much of it was taken; None when there is none."""
+    here: _Point, step: Floats, slope: float, length: float, at: Callable[[Floats], _Point], system: Factored,
+    allowed: Callable[[Points], bool] | None,
+) -> tuple[tuple[_Point, float] | None, bool]:
+    """A point along the step that is good enough, and how much of it was taken; None when there is none.
+
+    And whether points were refused because they are not allowed.
+    """
+    met_the_edge = False
     rounding = _ROUNDING * (system.chain.bending_scale + abs(here.energy))
-    for _ in range(5):
+    for _ in range(8):
         there = at(here.shape.twist + length * step)
+        if allowed is not None and not allowed(there.acting.points):
+            met_the_edge = True
+            length *= 0.5
+            continue
         if there.energy <= here.energy + 1e-4 * length * slope:
-            return there, length
+            return (there, length), met_the_edge
         # At rounding's level, energies cannot tell; the step is then small enough to be trusted.
         if -slope < rounding and there.energy <= here.energy + rounding:
-            return there, length
+            return (there, length), met_the_edge
         length *= 0.25
-    return None
+    return None, met_the_edge
 
 
 def _leave_saddle(chain: Chain, here: _Point, loads: Loads, at: Callable[[Floats], _Point], attempt: int) -> _Point:

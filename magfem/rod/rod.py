@@ -12,7 +12,7 @@ from scipy.spatial.transform import RigidTransform
 
 from magfem.errors import ConvergenceError, InputError, OutsideRegionError
 from magfem.rod.sections import FlexibleSection, MagnetSection, three
-from magfem.typing import ArrayLike, Floats
+from magfem.typing import ArrayLike, Floats, Points
 
 if TYPE_CHECKING:
     from magfem.fields.field import Field
@@ -94,7 +94,7 @@ class Rod:
         strict: bool = True,
         outside: str = "raise",
         leave_saddles: bool = True,
-        tolerance: float = 1e-10,
+        tolerance: float = 1e-9,
         most_iterations: int = 400,
     ) -> RodState:
         """The shape in which all loads balance.
@@ -136,16 +136,26 @@ class Rod:
         R, p = self._base
         start = chain.rest if guess is None else _start(guess, chain)
         if loads.conservative:
-            found = find_equilibrium(chain, loads, R, p, start, tolerance, most_iterations, leave_saddles)
+            region = None if loads.applied is None or outside == "extrapolate" else loads.applied.region
+
+            def allowed(points: Points) -> bool:
+                return region is None or bool(np.all(region.contains(points)))
+
+            found = find_equilibrium(chain, loads, R, p, start, tolerance, most_iterations, leave_saddles, allowed)
         else:
             found = relax(chain, loads, R, p, start, tolerance, most_iterations)
         state = RodState(self, loads, found)
+        if strict and found.outcome == "outside":
+            raise OutsideRegionError(
+                "the rod has no equilibrium on its way within the field's region: a magnet is pulled out of it "
+                f"({loads.applied.region.describe() if loads.applied else ''}); strict=False returns the last shape within"
+            )
         if strict and not found.converged:
             raise ConvergenceError(
                 f"the rod's shape did not converge ({found.outcome}): residual {state.residual:.1e} rad after "
                 f"{found.iterations} iterations; strict=False returns it as it is"
             )
-        if outside == "raise" and loads.applied is not None and len(found.factored.acting.points):
+        if found.converged and region is not None and len(found.factored.acting.points):
             inside = np.asarray(loads.applied.region.contains(found.factored.acting.points))
             if not inside.all():
                 worst = found.factored.acting.points[np.flatnonzero(~inside)[0]] * 1e3
