@@ -148,10 +148,12 @@ def _rest(one: FlexibleSection, h: float) -> Floats:
     else:
         curvature = np.broadcast_to(np.asarray(one.intrinsic_curvature, float), (where.size, 3))
     xi = np.concatenate([curvature, np.broadcast_to(strain, curvature.shape)], axis=1).reshape(-1, 2, 6)
-    return (h * np.einsum("ij,ejs->eis", _TO_TWISTS, xi)).reshape(-1, 12)
+    twists: Floats = h * np.einsum("ij,ejs->eis", _TO_TWISTS, xi)
+    return twists.reshape(-1, 12)
 
 
 def strains(chain: Chain, twist: Floats) -> Floats:
     """(e, 2, 6) curvature and strain at the Gauss points of every link; zero for rigid ones."""
     halves = twist.reshape(-1, 2, 6)
-    return np.einsum("ij,ejs->eis", TO_STRAINS, halves) / chain.length[:, None, None]
+    xi: Floats = np.einsum("ij,ejs->eis", TO_STRAINS, halves) / chain.length[:, None, None]
+    return xi

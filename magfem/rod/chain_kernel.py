@@ -128,9 +128,15 @@ def _contracted(w: Floats, twist: Floats, c: Floats, out: Floats) -> None:
     c1, c2, d1, d2 = c[0], c[1], c[2], c[3]
     for i in range(3):
         ai = a[i]
-        out[i, 0] = 2.0 * d1 * ai * cross0 + c2 * (w[i] * a[0] - 2.0 * w[0] * ai) + 2.0 * d2 * ai * (wa * a[0] - t * w[0])
-        out[i, 1] = 2.0 * d1 * ai * cross1 + c2 * (w[i] * a[1] - 2.0 * w[1] * ai) + 2.0 * d2 * ai * (wa * a[1] - t * w[1])
-        out[i, 2] = 2.0 * d1 * ai * cross2 + c2 * (w[i] * a[2] - 2.0 * w[2] * ai) + 2.0 * d2 * ai * (wa * a[2] - t * w[2])
+        out[i, 0] = (
+            2.0 * d1 * ai * cross0 + c2 * (w[i] * a[0] - 2.0 * w[0] * ai) + 2.0 * d2 * ai * (wa * a[0] - t * w[0])
+        )
+        out[i, 1] = (
+            2.0 * d1 * ai * cross1 + c2 * (w[i] * a[1] - 2.0 * w[1] * ai) + 2.0 * d2 * ai * (wa * a[1] - t * w[1])
+        )
+        out[i, 2] = (
+            2.0 * d1 * ai * cross2 + c2 * (w[i] * a[2] - 2.0 * w[2] * ai) + 2.0 * d2 * ai * (wa * a[2] - t * w[2])
+        )
         out[i, i] += c2 * wa
     # −c₁ [w]×
     out[0, 1] += c1 * w[2]
@@ -317,8 +323,11 @@ def factor(
     gain: Floats,
     pivots: Floats,
     resultant: Floats,
-) -> int:
-    """The energy's gradient, and its Hessian factored; returns how many of its eigenvalues are negative.
+) -> tuple[int, float]:
+    """The energy's gradient, and its Hessian factored.
+
+    Returns how many eigenvalues of the Hessian are negative, and the square of the gradient in the norm of the elastic
+    Hessian's inverse, J.
 
     wrench: (e + 1, 6) torque, force on every node about itself.  tangent: (e + 1, 6, 6) the symmetric part of minus
     its derivative with respect to x.  damping: how many times the elastic Hessian is added.  Written: gradient (e, 12),
@@ -335,7 +344,7 @@ def factor(
     work = np.empty((12, 6))
     M, N, d, d2 = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     links = flexible.size
-    negative = 0
+    negative, square = 0, 0.0
     for i in range(3):
         M[i], N[i] = wrench[links, i], wrench[links, 3 + i]
         resultant[links, i], resultant[links, 3 + i] = M[i], N[i]
@@ -384,6 +393,8 @@ def factor(
                 e1, e2 = twist[k, i] - rest[k, i], twist[k, 6 + i] - rest[k, 6 + i]
                 gradient[k, i] = g1[i] + spring * (OWN * e1 + CROSS * e2)
                 gradient[k, 6 + i] = g2[i] + spring * (OWN * e2 + CROSS * e1)
+                a, b = gradient[k, i], gradient[k, 6 + i]
+                square += (OWN * (a * a + b * b) - 2.0 * CROSS * a * b) / ((OWN * OWN - CROSS * CROSS) * spring)
                 damped = (1.0 + damping) * spring
                 Lk[i, i] += OWN * damped
                 Lk[6 + i, 6 + i] += OWN * damped
@@ -404,15 +415,15 @@ def factor(
         for i in range(6):
             for j in range(6):
                 H[i, j] += tangent[k, i, j]
-    return negative
+    return negative, square
 
 
 @kernel
 def _eliminate(L: Floats, mixed: Floats, gain: Floats, neutral: float) -> int:
     """Factor the lower half of L (12, 12) in place, L D Lᵀ, the diagonal as 1/D; gain = −(L D Lᵀ)⁻¹ mixedᵀ.
 
-    Returns how many pivots are negative and larger than `neutral`. A pivot of exactly zero becomes tiny and positive: the step is then huge,
-    and refused.
+    Returns how many pivots are below −`neutral`. A pivot of exactly zero becomes tiny: the step is then huge, and
+    refused.
     """
     negative = 0
     column = np.empty(12)
@@ -524,3 +535,62 @@ def solve(
                     f = B[k, j, i]
                     for q in range(n):
                         there[j, q] += f * out[i, q]
+
+
+@kernel
+def solve_one(
+    flexible: Booleans,
+    p: Floats,
+    B: Floats,
+    mixed: Floats,
+    gain: Floats,
+    pivots: Floats,
+    twist_load: Floats,
+    node_load: Floats,
+    twist: Floats,
+    x: Floats,
+) -> None:
+    """As `solve` for one load and a base that stands still: arrays without their last axis."""
+    links = flexible.size
+    l = -node_load[links]  # noqa: E741
+    for k in range(links - 1, -1, -1):
+        if flexible[k]:
+            Bk, L, out = B[k], pivots[k], twist[k]
+            for i in range(12):
+                total = twist_load[k, i]
+                for j in range(6):
+                    total -= Bk[j, i] * l[j]
+                for j in range(i):
+                    total -= L[i, j] * out[j]
+                out[i] = total
+            for i in range(11, -1, -1):
+                total = out[i] * L[i, i]
+                for j in range(i + 1, 12):
+                    total -= L[j, i] * out[j]
+                out[i] = total
+        d0, d1, d2 = p[k + 1, 0] - p[k, 0], p[k + 1, 1] - p[k, 1], p[k + 1, 2] - p[k, 2]
+        l[0] += d1 * l[5] - d2 * l[4]
+        l[1] += d2 * l[3] - d0 * l[5]
+        l[2] += d0 * l[4] - d1 * l[3]
+        for i in range(6):
+            if flexible[k]:
+                for j in range(12):
+                    l[i] += mixed[k, i, j] * twist[k, j]
+            l[i] -= node_load[k, i]
+    x[0] = 0.0
+    for k in range(links):
+        d0, d1, d2 = p[k + 1, 0] - p[k, 0], p[k + 1, 1] - p[k, 1], p[k + 1, 2] - p[k, 2]
+        here, there = x[k], x[k + 1]
+        for i in range(6):
+            there[i] = here[i]
+        there[3] += here[1] * d2 - here[2] * d1
+        there[4] += here[2] * d0 - here[0] * d2
+        there[5] += here[0] * d1 - here[1] * d0
+        if flexible[k]:
+            out = twist[k]
+            for i in range(12):
+                for j in range(6):
+                    out[i] += gain[k, i, j] * here[j]
+            for j in range(6):
+                for i in range(12):
+                    there[j] += B[k, j, i] * out[i]

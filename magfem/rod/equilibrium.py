@@ -23,6 +23,7 @@ TOLERANCE = 1e-9
 """rad, of the residual."""
 
 _LARGEST_TURN = 1.0  # rad, of any cross-section in one step
+_LARGEST_PREDICTED = 0.3  # rad, of any cross-section
 _ROUNDING = 1e-11  # of the energy: smaller changes say nothing
 _ESCAPES = 8
 _BLOCKED = 12  # steps in a row that the edge of what is allowed has shortened
@@ -96,7 +97,7 @@ def find_equilibrium(
         if system.chain_negative:
             damping = max(4 * damping, 1e-3)
             continue
-        step, moved = (part[..., 0] for part in system.answer(twist_load=-system.gradient[..., None]))
+        step, moved = system.step(-system.gradient)
         slope = float(np.vdot(system.gradient, step))
         if slope > 0:  # the remainder has made the Hessian indefinite
             damping = max(4 * damping, 1e-3)
@@ -119,7 +120,12 @@ def find_equilibrium(
 
 
 def _search(
-    here: _Point, step: Floats, slope: float, length: float, at: Callable[[Floats], _Point], system: Factored,
+    here: _Point,
+    step: Floats,
+    slope: float,
+    length: float,
+    at: Callable[[Floats], _Point],
+    system: Factored,
     allowed: Callable[[Points], bool] | None,
 ) -> tuple[tuple[_Point, float] | None, bool]:
     """A point along the step that is good enough, and how much of it was taken; None when there is none.
@@ -155,7 +161,7 @@ def _leave_saddle(chain: Chain, here: _Point, loads: Loads, at: Callable[[Floats
     z[:, [3, 4, 5, 9, 10, 11]] = 0.0
     moved = np.empty(0)
     for _ in range(12):
-        z, x = (part[..., 0] for part in system.answer(twist_load=_elastic(chain, z)[..., None]))
+        z, x = system.step(_elastic(chain, z))
         moved = x[:, :3]
         z /= np.abs(moved).max()
     best = here
@@ -204,9 +210,17 @@ def relax(
         while system.negative:
             damping *= 4
             system = factored(chain, shape, system.acting, loads.coupled, damping)
-        step, moved = (part[..., 0] for part in system.answer(twist_load=-system.gradient[..., None]))
+        step, moved = system.step(-system.gradient)
         turn = float(np.abs(moved[:, :3]).max())
         twist = twist + min(1.0, _LARGEST_TURN / 2 / max(turn, 1e-300)) * step
         damping = min(damping * float(np.clip(system.residual / before, 0.1, 2.0)), 1e3) if before < np.inf else damping
         damping = damping if damping > 1e-9 else 0.0
         before = system.residual
+
+
+def predicted(before: Factored, loads: Loads) -> Floats:
+    """Twists (e, 12) near the equilibrium under other loads, by how an equilibrium answers to small ones."""
+    shape = before.shape
+    change = loads.act(shape.R, shape.p).wrench - before.acting.wrench
+    step, moved = before.step(node_load=change)
+    return shape.twist + step if np.abs(moved[:, :3]).max() < _LARGEST_PREDICTED else shape.twist

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from math import sqrt
 
 import numpy as np
 
@@ -56,16 +57,35 @@ class Factored:
     pivots: Floats
     resultant: Floats
     chain_negative: int
+    gradient_square: float  # J, in the elastic energy's norm
 
-    @cached_property
+    @property
     def residual(self) -> float:
         """Unbalanced loads, as the angle in rad by which they would bend the unloaded rod (elastic energy's norm)."""
-        chain, flexible = self.chain, self.chain.flexible
-        own, cross = chain_kernel.OWN, chain_kernel.CROSS
-        g1, g2 = self.gradient[:, :6], self.gradient[:, 6:]
-        square = (own * (g1 * g1 + g2 * g2) - 2 * cross * g1 * g2) / (own**2 - cross**2)
-        energy = square[flexible] * (chain.length[flexible, None] / chain.stiffness[flexible])
-        return float(np.sqrt(energy.sum() / chain.bending_scale))
+        return sqrt(self.gradient_square / self.chain.bending_scale)
+
+    def step(self, twist_load: Floats | None = None, node_load: Floats | None = None) -> tuple[Floats, Floats]:
+        """As `answer`, to one load: (e, 12), (e + 1, 6), without the last axis."""
+        chain, links = self.chain, self.chain.links
+        twist_load = np.zeros((links, 12)) if twist_load is None else twist_load
+        node_load = np.zeros((links + 1, 6)) if node_load is None else node_load
+        twist, x = np.zeros((links, 12)), np.empty((links + 1, 6))
+        chain_kernel.solve_one(
+            chain.flexible,
+            self.shape.p,
+            self.B,
+            self.mixed,
+            self.gain,
+            self.pivots,
+            twist_load,
+            node_load,
+            twist,
+            x,
+        )
+        if self.acting.remainder is None:
+            return twist, x
+        twist, x = self._corrected(twist[..., None], x[..., None])
+        return twist[..., 0], x[..., 0]
 
     def answer(
         self, twist_load: Floats | None = None, node_load: Floats | None = None, base: Floats | None = None
@@ -75,7 +95,10 @@ class Factored:
         twist_load: (e, 12, n) on the twists.  node_load: (e + 1, 6, n) torque, force on the nodes.  base: (6, n)
         variations of the base's pose.
         """
-        twist, x = self._chain_answer(twist_load, node_load, base)
+        return self._corrected(*self._chain_answer(twist_load, node_load, base))
+
+    def _corrected(self, twist: Floats, x: Floats) -> tuple[Floats, Floats]:
+        """What H answers, from what H₀ does."""
         if self.acting.remainder is None:
             return twist, x
         unit_twist, unit_x, _ = self._unit_answers
@@ -137,7 +160,7 @@ class Factored:
         scale = np.sqrt(np.maximum(np.abs(np.diag(C)), np.finfo(float).tiny))
         C, W = 0.5 * (C + C.T) / np.outer(scale, scale), 0.5 * (W + W.T) * np.outer(scale, scale)
         small = np.block([[-C, -np.eye(size)], [-np.eye(size), W]])
-        return self.chain_negative + int(np.count_nonzero(np.linalg.eigvalsh(small) < 0)) - size
+        return self.chain_negative + int(np.count_nonzero(np.linalg.eigvalsh(small) < -chain_kernel.NEUTRAL)) - size
 
 
 def factored(chain: Chain, shape: Shape, acting: Acting, coupled: Integers, damping: float = 0.0) -> Factored:
@@ -145,7 +168,7 @@ def factored(chain: Chain, shape: Shape, acting: Acting, coupled: Integers, damp
     links = chain.links
     gradient, B, mixed = np.zeros((links, 12)), np.empty((links, 6, 12)), np.empty((links, 6, 12))
     gain, pivots, resultant = np.empty((links, 12, 6)), np.empty((links, 12, 12)), np.empty((links + 1, 6))
-    negative = chain_kernel.factor(
+    negative, square = chain_kernel.factor(
         chain.flexible,
         chain.length,
         chain.stiffness,
@@ -165,4 +188,4 @@ def factored(chain: Chain, shape: Shape, acting: Acting, coupled: Integers, damp
         pivots,
         resultant,
     )
-    return Factored(chain, shape, acting, coupled, gradient, B, mixed, gain, pivots, resultant, negative)
+    return Factored(chain, shape, acting, coupled, gradient, B, mixed, gain, pivots, resultant, negative, square)

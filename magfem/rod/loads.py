@@ -96,7 +96,9 @@ class Loads:
             chain.dipole_moment,
             R,
             p,
-            *jets,
+            jets[0],
+            jets[1],
+            jets[2],
             wrench,
             tangent,
         )

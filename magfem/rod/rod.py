@@ -113,7 +113,7 @@ class Rod:
         Raises InputError for what cannot be used, ConvergenceError (residual, iterations), OutsideRegionError.
         """
         from magfem.rod.applied_field import applied_field
-        from magfem.rod.equilibrium import find_equilibrium, relax
+        from magfem.rod.equilibrium import find_equilibrium, predicted, relax
         from magfem.rod.interaction import interaction_of
         from magfem.rod.loads import Loads
         from magfem.rod.state import RodState
@@ -134,9 +134,14 @@ class Rod:
             interaction,
         )
         R, p = self._base
-        start = chain.rest if guess is None else _start(guess, chain)
+        if guess is None:
+            start = chain.rest
+        elif guess.rod is self and guess.stable:
+            start = predicted(guess.factored, loads)
+        else:
+            start = _start(guess, chain)
+        region = None if loads.applied is None or outside == "extrapolate" else loads.applied.region
         if loads.conservative:
-            region = None if loads.applied is None or outside == "extrapolate" else loads.applied.region
 
             def allowed(points: Points) -> bool:
                 return region is None or bool(np.all(region.contains(points)))
@@ -145,10 +150,10 @@ class Rod:
         else:
             found = relax(chain, loads, R, p, start, tolerance, most_iterations)
         state = RodState(self, loads, found)
-        if strict and found.outcome == "outside":
+        if strict and found.outcome == "outside" and region is not None:
             raise OutsideRegionError(
-                "the rod has no equilibrium on its way within the field's region: a magnet is pulled out of it "
-                f"({loads.applied.region.describe() if loads.applied else ''}); strict=False returns the last shape within"
+                f"a magnet is pulled out of the field's region ({region.describe()}) before the rod finds an "
+                "equilibrium; strict=False returns the last shape within"
             )
         if strict and not found.converged:
             raise ConvergenceError(
@@ -156,12 +161,12 @@ class Rod:
                 f"{found.iterations} iterations; strict=False returns it as it is"
             )
         if found.converged and region is not None and len(found.factored.acting.points):
-            inside = np.asarray(loads.applied.region.contains(found.factored.acting.points))
+            inside = np.asarray(region.contains(found.factored.acting.points))
             if not inside.all():
                 worst = found.factored.acting.points[np.flatnonzero(~inside)[0]] * 1e3
                 raise OutsideRegionError(
                     f"a magnet of the rod ends at ({worst[0]:.4g}, {worst[1]:.4g}, {worst[2]:.4g}) mm, outside the "
-                    f"field's region ({loads.applied.region.describe()}); outside=\"extrapolate\" takes it as it is"
+                    f'field\'s region ({region.describe()}); outside="extrapolate" takes it as it is'
                 )
         return state
 

@@ -15,7 +15,7 @@ from magfem.typing import ArrayLike, Floats
 Curvature: TypeAlias = ArrayLike | Callable[[Floats], Floats]
 """(3,) 1/m, or a function of arc length (n,) m from the section's start that gives (n, 3)."""
 
-ELEMENTS, MAGNETIC_ELEMENTS = 10, 256
+ELEMENTS, MAGNETIC_ELEMENTS = 16, 256
 """Of a flexible section, by default; and of a hard-magnetic one, whose torques act at the nodes."""
 
 
@@ -70,7 +70,7 @@ class FlexibleSection:
     intrinsic_curvature: (3,) 1/m without load, in the section's axes, or a function of arc length; its third component
     is twist.  intrinsic_strain: (3,), dp/ds in the section's axes without load.  force_per_length: (3,) N/m and
     moment_per_length: (3,) N, in world axes, whatever the shape.  magnetic_moment_per_length: (3,) A·m in the section's
-    axes, of a hard-magnetic section.  elements: how many it is divided into (default 10, hard-magnetic 256); the shape's error falls with their fourth
+    axes, of a hard-magnetic section.  elements: how many it is divided into (default 16, hard-magnetic 256); the shape's error falls with their fourth
     power, that of a hard-magnetic section's torques with their square.
     Source of the constitutive law: dissertation, eq. 2.2; K = diag(EI_x, EI_y, GJ), diag(GA, GA, EA).
     """
@@ -96,7 +96,9 @@ class FlexibleSection:
         if not (isfinite(self.density) and self.density >= 0):
             raise InputError(f"flexible section: density must not be negative (kg/m³), got {self.density!r}")
         if not -1 < self.poisson_ratio <= 0.5:
-            raise InputError(f"flexible section: poisson_ratio must lie above -1 and up to 0.5, got {self.poisson_ratio!r}")
+            raise InputError(
+                f"flexible section: poisson_ratio must lie above -1 and up to 0.5, got {self.poisson_ratio!r}"
+            )
         if self.shear_modulus is not None:
             positive("flexible section", "shear_modulus", self.shear_modulus)
         if (self.radius is None) == (self.cross_section is None):
@@ -155,7 +157,9 @@ class MagnetSection:
         if not (isfinite(self.mass) and self.mass >= 0):
             raise InputError(f"magnet section: mass must not be negative (kg), got {self.mass!r}")
         if type(self.field_points) is not int or not 1 <= self.field_points <= 16:
-            raise InputError(f"magnet section: field_points must be a whole number from 1 to 16, got {self.field_points!r}")
+            raise InputError(
+                f"magnet section: field_points must be a whole number from 1 to 16, got {self.field_points!r}"
+            )
         _ = self.moment_vector
 
     @property
