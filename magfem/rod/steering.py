@@ -19,13 +19,21 @@ from magfem.rod.bounded_step import bounded_step
 from magfem.rod.goals import Goal, GoalError, goal_error
 from magfem.rod.rod import Rod
 from magfem.rod.state import RodState
+from magfem.rod.stiffness_estimate import StiffnessEstimate, stiffened, updated
 from magfem.typing import ArrayLike, Floats, Points
 
 if TYPE_CHECKING:
     from magfem.actuation import CoilSystem
 
-OUTCOMES = ("moving", "converged", "limit active", "singular", "stalled", "lost branch")
-"""How a step can end; all but the first two are diagnoses of why the goals are not reached."""
+OUTCOMES = ("moving", "converged", "limit active", "singular", "stalled", "lost branch", "unreachable")
+"""How a step can end; all but the first two say why the goals are not reached.
+
+limit active: no progress, with currents or joints at their limits.  singular: no progress, and the Jacobian has lost
+directions.  stalled: no progress for another reason, such as noise.  lost branch: the plant has snapped, or the model
+has no stable shape to go on to.  unreachable: no way was found on the model, whatever the start (`planning.plan`).
+"""
+
+_NOTICEABLE = 0.005  # of the stiffness: less is not worth a new model
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -34,7 +42,9 @@ class Steering:
 
     currents (c,) A, joints (j,) rad or m.  model: the model's state at these.  error: of the last measurement.
     expected: (m, 6) shift and turn of every magnet that the last step should have made.  best: smallest error so far,
-    rad, and `since` how many steps ago.  condition: of the last Jacobian.
+    rad, and `since` how many steps ago.  condition: of the last Jacobian.  stiffness: what measurements say of the
+    plant's, beside the model's; `in_use` is the factor that the model has.  route: parameters (c + j,) to go through
+    before the goals are looked at.  plans: how many routes were planned so far.
     """
 
     currents: Floats
@@ -48,6 +58,15 @@ class Steering:
     since: int = 0
     steps: int = 0
     condition: float = np.inf
+    stiffness: StiffnessEstimate = StiffnessEstimate()
+    in_use: float = 1.0
+    route: tuple[Floats, ...] = ()
+    plans: int = 0
+
+    @property
+    def parameters(self) -> Floats:
+        """(c + j,) currents, then joints."""
+        return np.concatenate([self.currents, self.joints])
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -59,8 +78,9 @@ class Controller:
     own.  joint_limits: (j, 2), by default the joints' own; equal ones hold a joint still.
     gain: the share of an error that a step shall take away.  largest_error: rad of any row that one step works on.
     damping: of the pseudo-inverse, rad per A, while the error is above 0.1 rad; below it falls with the error.
-    relaxation: the share of its currents that a step takes away where this costs no error (the null-space task).
-    tolerance: rad at which the goals are reached.  patience: steps without progress after which steering is stuck.
+    relaxation: the share of its currents that a step takes away where this costs no error by the model (the null-space
+    task); it falls with the error as well, for what the model does not see of the plant would keep up an error.
+    adapt: whether the model takes on the stiffness that the measurements show.  tolerance: rad at which the goals are reached.  patience: steps without progress after which steering is stuck.
     """
 
     rod: Rod
@@ -76,8 +96,10 @@ class Controller:
     damping: float = 0.02
     relaxation: float = 0.02
     largest_condition: float = 1e5
+    adapt: bool = True
     tolerance: float = np.radians(0.05)
     patience: int = 60
+    room: float = 1.0
 
     def __post_init__(self) -> None:
         if not self.goals:
@@ -104,6 +126,7 @@ class Controller:
         joints = own if self.joint_limits is None else np.asarray(self.joint_limits, dtype=float)
         if joints.shape != own.shape or np.any(joints[:, 0] > joints[:, 1]):
             raise InputError(f"controller: joint_limits must be {own.shape[0]} pairs, the lower first, got {joints!r}")
+        top = self.room * top
         return np.concatenate([-top, joints[:, 0]]), np.concatenate([top, joints[:, 1]])
 
     @cached_property
@@ -128,6 +151,8 @@ class Controller:
         directions and positions alone.
         """
         error = goal_error(self.goals, positions, frames)
+        if now.route:
+            return self._on_the_way(replace(now, error=error, measured=(positions, frames), steps=now.steps + 1))
         size = error.size
         seen: dict[str, object] = {"error": error, "measured": (positions, frames), "steps": now.steps + 1}
         if size < (1 - 0.02) * now.best:
@@ -138,18 +163,21 @@ class Controller:
             return replace(now, outcome="converged", expected=None, **seen)
         if self._jumped(now, positions, frames):
             return replace(now, outcome="lost branch", expected=None, **seen)
+        if self.adapt:
+            now = self._adapted(now, positions, frames)
         jacobian = now.model.jacobian
         J = np.einsum("rms,msp->rp", error.slope, jacobian) * self.scale
-        parameters = np.concatenate([now.currents, now.joints])
+        parameters = now.parameters
         wanted = -self.gain * np.clip(error.vector, -self.largest_error, self.largest_error)
         low, high = self._room(parameters)
+        near = min(1.0, size / 0.1)
         step = bounded_step(
             J,
             wanted,
             low,
             high,
-            self.damping * min(1.0, size / 0.1),
-            -self.relaxation * np.where(np.arange(parameters.size) < self.coils, parameters, 0.0),
+            self.damping * near**0.75,
+            -self.relaxation * near * np.where(np.arange(parameters.size) < self.coils, parameters, 0.0),
             self.largest_condition,
         )
         change = step.change * self.scale
@@ -162,7 +190,7 @@ class Controller:
         if there is None:
             return replace(now, outcome="lost branch", expected=None, **seen)
         parameters, model = there
-        expected = jacobian @ (parameters - np.concatenate([now.currents, now.joints]))
+        expected = jacobian @ (parameters - now.parameters)
         return replace(
             now,
             currents=parameters[: self.coils],
@@ -172,6 +200,48 @@ class Controller:
             expected=expected,
             **seen,
         )
+
+    def _on_the_way(self, now: Steering) -> Steering:
+        """One step along the route, as far as rates allow; the model goes along, or is solved anew where it cannot."""
+        low, high = self._room(now.parameters)
+        left = (now.route[0] - now.parameters) / self.scale
+        part = min(1.0, float(np.min(np.where(left < 0, low, high) / np.where(left == 0, np.inf, left), initial=1.0)))
+        there = now.parameters + part * left * self.scale
+        field = (self.system, there[: self.coils], there[self.coils :])
+        rod, model = now.model.rod, now.model
+        for guess in (now.model, None):
+            try:
+                model = rod.solve(field, self.gravity, guess=guess, strict=False)
+            except MagfemError:
+                continue
+            if model.stable:
+                break
+        return replace(
+            now,
+            currents=there[: self.coils],
+            joints=there[self.coils :],
+            model=model,
+            outcome="moving",
+            expected=None,
+            best=np.inf,
+            since=0,
+            route=now.route[1:] if part == 1.0 else now.route,
+        )
+
+    def _adapted(self, now: Steering, positions: Points, frames: Floats) -> Steering:
+        """With what the measurement says of the plant's stiffness; in the model when it differs by enough."""
+        estimate = updated(now.stiffness, now.model, now.in_use, positions, frames[:, :, 2])
+        factor = estimate.factor
+        if abs(factor / now.in_use - 1) < _NOTICEABLE:
+            return replace(now, stiffness=estimate)
+        field = (self.system, now.currents, now.joints)
+        try:
+            model = stiffened(self.rod, factor).solve(field, self.gravity, guess=now.model, strict=False)
+        except MagfemError:
+            return replace(now, stiffness=estimate)
+        if not model.stable:
+            return replace(now, stiffness=estimate)
+        return replace(now, stiffness=estimate, model=model, in_use=factor)
 
     def _room(self, parameters: Floats) -> tuple[Floats, Floats]:
         """How far a step may go down and up, in units of `scale`."""
@@ -184,12 +254,12 @@ class Controller:
 
     def _followed(self, now: Steering, change: Floats) -> tuple[Floats, RodState] | None:
         """The model after as much of the change as it can follow stably; None when that is nothing."""
-        parameters = np.concatenate([now.currents, now.joints])
+        parameters = now.parameters
         for part in (1.0, 0.3, 0.1):
             there = np.clip(parameters + part * change, *self.limits)
             field = (self.system, there[: self.coils], there[self.coils :])
             try:
-                model = self.rod.solve(field, self.gravity, guess=now.model, strict=False)
+                model = now.model.rod.solve(field, self.gravity, guess=now.model, strict=False)
             except MagfemError:
                 continue
             if model.stable:
