@@ -262,7 +262,7 @@ class Controller:
                 model = now.model.rod.solve(field, self.gravity, guess=now.model, strict=False)
             except MagfemError:
                 continue
-            if model.stable:
+            if model.stable and not model.snapped:
                 return there, model
         return None
 
