@@ -1,0 +1,140 @@
+"""Rods in recipes: a base, materials, and sections from the base to the tip.
+
+    [materials.PMC-770]
+    youngs_modulus = "5.5 MPa"
+    poisson_ratio = 0.5               # or shear_modulus; 0.5 when neither is stated
+    density = "1040 kg/m^3"
+
+    [rod]
+    position = ["-30 mm", "0 mm", "0 mm"]   # of the base; its +z is the rod's axis
+    direction = [1, 0, 0]
+    interacting = false               # whether the magnets act on each other, as dipoles
+
+    [[rod.sections]]
+    material = "PMC-770"
+    length = "25 mm"
+    radius = "1.75 mm"                # a tube with inner_radius
+
+    [[rod.sections]]
+    magnet = "disc_magnet_3x2.5"      # a magnet's card: moment, volume, length; its z along the rod
+    density = "7500 kg/m^3"           # or mass
+
+A magnet is a card, or `model`, a fitted one whose moment is taken, or a stated `moment` along the rod; these two need
+`length` and `mass`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from magfem.errors import CardError, InputError
+from magfem.fields.hull import CylinderHull
+from magfem.fields.terms import frame_about
+from magfem.fitting.model import load_model
+from magfem.geometry import Magnets, load_geometry
+from magfem.geometry.card import Table
+from magfem.geometry.vectors import three_lengths, three_numbers
+from magfem.rod import FlexibleSection, MagnetSection, Rod
+
+_KINDS = ("material", "magnet", "model", "moment")
+
+
+def read_rod(card: Table) -> Rod:
+    """The rod of a recipe's tables `rod` and `materials`. Raises CardError."""
+    table = card.table("rod")
+    table.only("position", "direction", "interacting", "sections")
+    materials = card.table("materials") if "materials" in card else None
+    sections = [_section(entry, materials) for entry in table.tables("sections")]
+    position = np.array(three_lengths(table, "position")) if "position" in table else np.zeros(3)
+    base = RigidTransform.from_components(position, _turn(table))
+    interacting = table.value("interacting") if "interacting" in table else False
+    if not isinstance(interacting, bool):
+        raise table.error("interacting must be true or false", "interacting")
+    magnets = sum(isinstance(one, MagnetSection) for one in sections)
+    if not magnets:
+        raise table.error("a rod that is steered needs at least one magnet among its sections", "sections")
+    try:
+        return Rod(sections, base, [None] * magnets if interacting else None)
+    except InputError as error:
+        raise table.error(str(error), "sections") from None
+
+
+def _turn(table: Table) -> Rotation:
+    if "direction" not in table:
+        return Rotation.identity()
+    direction = np.array(three_numbers(table, "direction"))
+    if not 0 < np.linalg.norm(direction) < np.inf:
+        raise table.error("direction must be three finite numbers that are not all zero", "direction")
+    return Rotation.from_matrix(frame_about(direction))
+
+
+def _section(entry: Table, materials: Table | None) -> FlexibleSection | MagnetSection:
+    stated = [key for key in _KINDS if key in entry]
+    if len(stated) != 1:
+        got = " and ".join(stated) if stated else "none of them"
+        raise entry.error(f"a section has a material (flexible), or a magnet, model or moment (a magnet), got {got}")
+    try:
+        return _flexible(entry, materials) if stated == ["material"] else _magnet(entry, stated[0])
+    except CardError:
+        raise
+    except InputError as error:
+        raise entry.error(str(error), stated[0]) from None
+
+
+def _flexible(entry: Table, materials: Table | None) -> FlexibleSection:
+    entry.only("material", "length", "radius", "inner_radius", "elements")
+    name = entry.text("material")
+    if materials is None or name not in materials:
+        known = ", ".join(materials.values) if materials is not None else "none"
+        raise entry.error(f"no material of this name stands under [materials] (there: {known})", "material")
+    material = materials.table(name)
+    material.only("youngs_modulus", "poisson_ratio", "shear_modulus", "density")
+    if "shear_modulus" in material and "poisson_ratio" in material:
+        raise material.error("state poisson_ratio or shear_modulus, not both", "shear_modulus")
+    elements = entry.value("elements") if "elements" in entry else None
+    if elements is not None and (isinstance(elements, bool) or not isinstance(elements, int)):
+        raise entry.error("elements must be a whole number", "elements")
+    return FlexibleSection(
+        length=entry.quantity("length", "length"),
+        radius=entry.quantity("radius", "length"),
+        inner_radius=entry.quantity("inner_radius", "length") if "inner_radius" in entry else 0.0,
+        youngs_modulus=material.quantity("youngs_modulus", "pressure"),
+        poisson_ratio=material.number("poisson_ratio") if "poisson_ratio" in material else 0.5,
+        shear_modulus=material.quantity("shear_modulus", "pressure") if "shear_modulus" in material else None,
+        density=material.quantity("density", "density") if "density" in material else 0.0,
+        elements=elements,
+    )
+
+
+def _magnet(entry: Table, kind: str) -> MagnetSection:
+    entry.only(kind, "length", "mass", "field_points", *(["density"] if kind == "magnet" else []))
+    points = entry.value("field_points") if "field_points" in entry else 1
+    if isinstance(points, bool) or not isinstance(points, int):
+        raise entry.error("field_points must be a whole number", "field_points")
+    length = entry.quantity("length", "length") if "length" in entry else None
+    mass = entry.quantity("mass", "mass") if "mass" in entry else None
+    moment: tuple[float, float, float]
+    if kind == "magnet":
+        device = load_geometry(entry.text("magnet"))
+        if not isinstance(device, Magnets):
+            raise entry.error("this card is not a magnet's", "magnet")
+        x, y, z = device.moment.tolist()
+        moment = (x, y, z)
+        if length is None and isinstance(device.hull, CylinderHull):
+            length = device.hull.length
+        if mass is None and "density" in entry:
+            mass = device.volume * entry.quantity("density", "density")
+    elif kind == "model":
+        model = load_model(entry.text("model"))
+        if model.unit != "T":
+            raise entry.error("this model is a coil's, and a rod carries magnets", "model")
+        x, y, z = np.asarray(model.moment, dtype=float).tolist()
+        moment = (x, y, z)
+    else:
+        moment = (0.0, 0.0, entry.quantity("moment", "moment"))
+    for key, value in (("length", length), ("mass", mass)):
+        if value is None:
+            raise entry.error(f"missing key {key}: this magnet does not say its own", key)
+    assert length is not None and mass is not None
+    return MagnetSection(length=length, moment=moment, mass=mass, field_points=points)
