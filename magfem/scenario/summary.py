@@ -66,6 +66,7 @@ def _target(run: Run, number: int, ending: Ending) -> dict[str, Any]:
         "reached_deg": told_angles(run, reached),
         "iterations": ending.iterations,
         "outcome": ending.outcome,
+        "note": ending.note,
         "expected": ending.target.expected,
         "as_expected": ending.as_expected,
         "error_deg": np.degrees(between(reached, wanted)),
@@ -82,8 +83,6 @@ def _target(run: Run, number: int, ending: Ending) -> dict[str, Any]:
             "reached_axis": axes[1],
             "axis_error_deg": np.degrees(between(*axes)),
         }
-    if ending.note:
-        found["note"] = ending.note
     return found
 
 

@@ -1,0 +1,86 @@
+"""A run as an animation: the rod in side view (and from above in space), and the angles as they come."""
+
+from __future__ import annotations
+
+import io
+from typing import Any
+
+import numpy as np
+from matplotlib.animation import FuncAnimation, PillowWriter
+from matplotlib.figure import Figure
+
+from magfem.report.figures.style import GREY, drawing, grid
+from magfem.report.run_pictures import MAGNETS, MILLI, VIEWS, draw_rod
+from magfem.scenario.run import Run
+from magfem.scenario.summary import told_angles
+
+_FRAMES, _PER_SECOND, _DPI = 120, 15, 75
+
+
+def animation(run: Run) -> bytes:
+    """A GIF of up to about 120 pictures, evenly over the steps, each with the plant and what was wanted."""
+    steps = np.unique(np.linspace(0, len(run.steps) - 1, _FRAMES).round().astype(int))
+    actual, wanted = told_angles(run, run.stacked("actual")), told_angles(run, run.wanted)
+    lines = run.stacked("plant")
+    names = ["side view"] if run.scenario.planar else ["side view", "top view"]
+    with drawing():
+        drawn = Figure(figsize=(8.0, 3.4), dpi=_DPI, layout="constrained")
+        panels = drawn.subplots(1, len(names) + 1, width_ratios=[1.0] * len(names) + [1.1])
+
+        def show(k: int) -> list[Any]:
+            for axes, name in zip(panels, names, strict=False):
+                seen, across, up = VIEWS[name]
+                axes.clear()
+                x, y = seen.project(run.steps[0].plant).T * MILLI
+                axes.plot(x, y, color=GREY, linewidth=0.8, linestyle=":")
+                draw_rod(axes, seen, lines[k], run, k, "#1f2429", "")
+                for m, direction in enumerate(run.wanted[k]):
+                    start = seen.project(run.steps[k].places[m]) * MILLI
+                    tip = 12 * seen.project(direction)
+                    axes.annotate(
+                        "",
+                        tuple(start + tip),
+                        tuple(start),
+                        arrowprops={"arrowstyle": "->", "color": MAGNETS[m % len(MAGNETS)], "linestyle": "--"},
+                    )
+                flat = seen.project(lines) * MILLI
+                middle, half = (flat.max((0, 1)) + flat.min((0, 1))) / 2, 0.5 * float(np.ptp(flat, (0, 1)).max()) + 12
+                axes.set_xlim(middle[0] - half, middle[0] + half)
+                axes.set_ylim(middle[1] - half, middle[1] + half)
+                axes.set_aspect("equal")
+                axes.set(xlabel=across, ylabel=up, title=f"{name}, step {k}")
+                grid(axes)
+            last = panels[-1]
+            last.clear()
+            for m in range(actual.shape[1]):
+                colour = MAGNETS[m % len(MAGNETS)]
+                last.plot(wanted[: k + 1, m], color=colour, linewidth=0.9, linestyle="--")
+                last.plot(actual[: k + 1, m], color=colour, label=f"magnet {m + 1}")
+            low, high = min(actual.min(), wanted.min()), max(actual.max(), wanted.max())
+            last.set(xlim=(0, len(run.steps)), ylim=(low - 4, high + 4), xlabel="step", title="angle of rotation (deg)")
+            last.legend(loc="upper left", ncols=2)
+            return []
+
+        moving = FuncAnimation(drawn, show, frames=steps.tolist(), init_func=lambda: [])
+        return _gif(moving)
+
+
+def _gif(moving: FuncAnimation) -> bytes:
+    """Matplotlib's Pillow writer wants a file; this is one in memory."""
+    content = io.BytesIO()
+
+    class Writer(PillowWriter):
+        def finish(self) -> None:
+            first, *others = [frame.convert("P", palette=1, colors=64) for frame in self._frames]
+            first.save(
+                content,
+                format="GIF",
+                save_all=True,
+                append_images=others,
+                duration=int(1000 / self.fps),
+                loop=0,
+                optimize=True,
+            )
+
+    moving.save("animation.gif", writer=Writer(fps=_PER_SECOND))
+    return content.getvalue()
