@@ -68,7 +68,7 @@ def find_equilibrium(
     """For loads with a potential, the equilibrium that descending from the twists `start` (e, 12) leads to.
 
     R_base (3, 3), p_base (3,) m: the base's pose.  leave_saddles: go on from an unstable equilibrium to a stable one.
-    allowed: whether the dipoles may be at points (d, 3) m; they do not leave what is allowed, unless they start outside.
+    allowed: whether the dipoles may be at points (d, 3) m; they do not leave what is allowed, unless they start beyond.
     """
 
     def at(twist: Floats) -> _Point:

@@ -67,8 +67,8 @@ class GoalError:
 def goal_error(goals: Sequence[Goal], positions: Points, frames: Floats) -> GoalError:
     """How far magnets at `positions` (m, 3) with `frames` (m, 3, 3) are from the goals.
 
-    Directions: the azimuthal equidistant map about the wanted one, (θ / sin θ) (t₁·a, t₂·a), whose length is the angle θ
-    itself; it has no arc cosine, whose slope is infinite at the goal. Rotations: the logarithm of R Rᵀ_wanted.
+    Directions: the azimuthal equidistant map about the wanted one, (θ / sin θ) (t₁·a, t₂·a), whose length is the angle
+    θ itself; it has no arc cosine, whose slope is infinite at the goal. Rotations: the logarithm of R Rᵀ_wanted.
     """
     count = len(positions)
     rows, slopes, angles, distances = [], [], [], []

@@ -8,7 +8,7 @@ integrator that could wind up: what a limit cuts off is not remembered. Every st
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -58,7 +58,7 @@ class Steering:
     since: int = 0
     steps: int = 0
     condition: float = np.inf
-    stiffness: StiffnessEstimate = StiffnessEstimate()
+    stiffness: StiffnessEstimate = field(default_factory=StiffnessEstimate)
     in_use: float = 1.0
     route: tuple[Floats, ...] = ()
     plans: int = 0
@@ -80,7 +80,9 @@ class Controller:
     damping: of the pseudo-inverse, rad per A, while the error is above 0.1 rad; below it falls with the error.
     relaxation: the share of its currents that a step takes away where this costs no error by the model (the null-space
     task); it falls with the error as well, for what the model does not see of the plant would keep up an error.
-    adapt: whether the model takes on the stiffness that the measurements show.  tolerance: rad at which the goals are reached.  patience: steps without progress after which steering is stuck.
+    largest_condition: singular values below the largest over it are left out.  adapt: whether the model takes on the
+    stiffness that the measurements show.  tolerance: rad at which the goals are reached.  patience: steps without
+    progress after which steering is stuck.  room: the share of the current limits that is used.
     """
 
     rod: Rod
@@ -207,11 +209,11 @@ class Controller:
         left = (now.route[0] - now.parameters) / self.scale
         part = min(1.0, float(np.min(np.where(left < 0, low, high) / np.where(left == 0, np.inf, left), initial=1.0)))
         there = now.parameters + part * left * self.scale
-        field = (self.system, there[: self.coils], there[self.coils :])
+        where = (self.system, there[: self.coils], there[self.coils :])
         rod, model = now.model.rod, now.model
         for guess in (now.model, None):
             try:
-                model = rod.solve(field, self.gravity, guess=guess, strict=False)
+                model = rod.solve(where, self.gravity, guess=guess, strict=False)
             except MagfemError:
                 continue
             if model.stable:
@@ -234,9 +236,9 @@ class Controller:
         factor = estimate.factor
         if abs(factor / now.in_use - 1) < _NOTICEABLE:
             return replace(now, stiffness=estimate)
-        field = (self.system, now.currents, now.joints)
+        where = (self.system, now.currents, now.joints)
         try:
-            model = stiffened(self.rod, factor).solve(field, self.gravity, guess=now.model, strict=False)
+            model = stiffened(self.rod, factor).solve(where, self.gravity, guess=now.model, strict=False)
         except MagfemError:
             return replace(now, stiffness=estimate)
         if not model.stable:
@@ -257,9 +259,9 @@ class Controller:
         parameters = now.parameters
         for part in (1.0, 0.3, 0.1):
             there = np.clip(parameters + part * change, *self.limits)
-            field = (self.system, there[: self.coils], there[self.coils :])
+            where = (self.system, there[: self.coils], there[self.coils :])
             try:
-                model = now.model.rod.solve(field, self.gravity, guess=now.model, strict=False)
+                model = now.model.rod.solve(where, self.gravity, guess=now.model, strict=False)
             except MagfemError:
                 continue
             if model.stable and not model.snapped:
