@@ -229,9 +229,3 @@ def predicted(before: Factored, loads: Loads) -> tuple[Floats, float]:
     step, moved = before.step(node_load=change)
     turn = float(np.abs(moved[:, :3]).max())
     return (shape.twist + step if turn < _LARGEST_PREDICTED else shape.twist), turn
-
-
-def largest_turn(before: Floats, after: Floats) -> float:
-    """rad, the most that any of the frames (n, 3, 3) has turned."""
-    least = float(np.einsum("nij,nij->n", before, after).min())
-    return float(np.arccos(np.clip((least - 1) / 2, -1.0, 1.0)))

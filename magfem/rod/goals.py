@@ -137,7 +137,8 @@ def _inverse_left_jacobian(e: Floats) -> Floats:
     if theta < 1e-4:
         return np.eye(3) - 0.5 * E + E @ E / 12
     half = theta / 2
-    return np.eye(3) - 0.5 * E + (1 - half / np.tan(half)) / theta**2 * E @ E
+    inverse: Floats = np.eye(3) - 0.5 * E + (1 - half / np.tan(half)) / theta**2 * E @ E
+    return inverse
 
 
 def _cross(a: Floats) -> Floats:

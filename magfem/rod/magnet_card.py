@@ -32,11 +32,11 @@ def magnet_section(
     with a recoil permeability above 1 a magnet is weaker than its remanence times its volume, which is taken without
     one.  Raises InputError for what is no magnet, CardError for a wrong card.
     """
-    from magfem.geometry import Coil, load_geometry
+    from magfem.geometry import Magnets, load_geometry
 
     geometry = load_geometry(magnet) if isinstance(magnet, str | os.PathLike) else magnet
-    if isinstance(geometry, Coil):
-        raise InputError(f"a rod's magnet is a permanent magnet, and {geometry.name or geometry.kind} is a coil")
+    if not isinstance(geometry, Magnets):
+        raise InputError(f"a rod's magnet is a permanent magnet, and {geometry.name or geometry.words} is not")
     positive("magnet section", "density", density)
     far = 2 * geometry.hull.radius
     above, below = geometry.hull.distance(np.array([[0.0, 0.0, far], [0.0, 0.0, -far]]))
