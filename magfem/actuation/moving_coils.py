@@ -57,7 +57,23 @@ class MovingCoils:
         hessian = np.empty((count, n, 3, 3, 3) if order > 1 else (1, 0, 3, 3, 3))
         carrier, group = self.carrier[:count], self.group[: count + 1]
         if n < 2 * PARALLEL_FROM:
-            moved_jets(points, values, *self.joints.linkage, carrier, group, *self.packed, order, B, gradient, hessian)
+            sequence, parent, revolute, axis, point = self.joints.linkage
+            moved_jets(
+                points,
+                values,
+                sequence,
+                parent,
+                revolute,
+                axis,
+                point,
+                carrier,
+                group,
+                *self.packed,
+                order,
+                B,
+                gradient,
+                hessian,
+            )
         else:
             numbers = self.packed.numbers.copy()
             carried_numbers(self.motions(values), carrier, group, numbers)
@@ -73,5 +89,6 @@ class MovingCoils:
         """Derivatives (j, n, 3), (j, n, 3, 3) of B and gradient of the currents (c,), from the jets of order 2."""
         shape = (values.size, points.shape[0])
         dB, dG = np.empty((*shape, 3)), np.empty((*shape, 3, 3))
-        joint_derivatives(points, currents, values, *self.joints.linkage, self.carried, *jets, dB, dG)
+        B, gradient, hessian = jets
+        joint_derivatives(points, currents, values, *self.joints.linkage, self.carried, B, gradient, hessian, dB, dG)
         return dB, dG
