@@ -2,6 +2,7 @@
 
 from magfem.actuation.calibration import Calibration, calibrate
 from magfem.actuation.coil_system import CoilSystem, SystemCoil, SystemField
+from magfem.actuation.joints import Joint
 from magfem.actuation.load import load_system
 from magfem.actuation.mpem import read_mpem
 from magfem.actuation.mpem_export import MpemExport, write_mpem
@@ -9,6 +10,7 @@ from magfem.actuation.mpem_export import MpemExport, write_mpem
 __all__ = [
     "Calibration",
     "CoilSystem",
+    "Joint",
     "MpemExport",
     "SystemCoil",
     "SystemField",
