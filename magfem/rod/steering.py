@@ -120,7 +120,9 @@ class Controller:
     @cached_property
     def limits(self) -> tuple[Floats, Floats]:
         """Lowest and highest of all parameters (c + j,)."""
-        top: Floats = np.array([np.inf if one.current_limit is None else one.current_limit for one in self.system.coils])
+        top: Floats = np.array(
+            [np.inf if one.current_limit is None else one.current_limit for one in self.system.coils]
+        )
         if self.current_limit is not None:
             top = np.minimum(top, self.current_limit)
         if not np.isfinite(top).all():
