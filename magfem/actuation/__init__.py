@@ -6,6 +6,7 @@ from magfem.actuation.joints import Joint
 from magfem.actuation.load import load_system
 from magfem.actuation.mpem import read_mpem
 from magfem.actuation.mpem_export import MpemExport, write_mpem
+from magfem.actuation.wrench_map import WrenchMap
 
 __all__ = [
     "Calibration",
@@ -14,6 +15,7 @@ __all__ = [
     "MpemExport",
     "SystemCoil",
     "SystemField",
+    "WrenchMap",
     "calibrate",
     "load_system",
     "read_mpem",
