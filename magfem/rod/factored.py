@@ -16,7 +16,7 @@ from magfem.typing import Floats, Integers, Points
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """Twists (e, 12) and the poses that follow: R (e + 1, 3, 3), p (e + 1, 3) m of the nodes, and between two screws."""
+    """Twists (e, 12), and the poses that follow: R (e + 1, 3, 3), p (e + 1, 3) m of nodes, and between two screws."""
 
     twist: Floats
     R: Floats

@@ -183,10 +183,13 @@ class Rod:
 
 def _snapped(guess: RodState, found: Factored, expected: float) -> bool:
     """Whether the rod turned far more than the guess's own answer to the change of loads."""
-    from magfem.rod.equilibrium import largest_turn
+    return largest_turn(guess.frames, found.shape.R) > max(SNAP, 4 * expected)
 
-    turned = largest_turn(guess.frames, found.shape.R)
-    return turned > max(SNAP, 4 * expected)
+
+def largest_turn(before: Floats, after: Floats) -> float:
+    """rad, the most that any of the frames (n, 3, 3) has turned."""
+    least = float(np.einsum("nij,nij->n", before, after).min())
+    return float(np.arccos(np.clip((least - 1) / 2, -1.0, 1.0)))
 
 
 def _start(guess: RodState, chain: Chain) -> Floats:

@@ -32,7 +32,9 @@ class StiffnessEstimate:
         return exp(self.log_factor)
 
 
-def updated(before: StiffnessEstimate, model: RodState, in_use: float, positions: Points, axes: Floats) -> StiffnessEstimate:
+def updated(
+    before: StiffnessEstimate, model: RodState, in_use: float, positions: Points, axes: Floats
+) -> StiffnessEstimate:
     """The estimate after magnets were seen at `positions` (m, 3) m, the rod's axis along `axes` (m, 3) there.
 
     model: the state of the rod whose moduli are `in_use` times the nominal ones. One Gauss–Newton step of the factor
@@ -43,7 +45,8 @@ def updated(before: StiffnessEstimate, model: RodState, in_use: float, positions
     moduli = np.array([one.youngs_modulus for one in model.rod.sections if isinstance(one, FlexibleSection)])
     frames = model.magnet_frames[:, :, 2]
     shift = moved.positions[nodes] @ moduli / POSITION_SCALE
-    turn = np.cross(moved.rotations[nodes] @ moduli, frames)
+    a, b = moved.rotations[nodes] @ moduli, frames
+    turn = a[:, [1, 2, 0]] * b[:, [2, 0, 1]] - a[:, [2, 0, 1]] * b[:, [1, 2, 0]]
     slope = np.concatenate([shift, turn]).ravel()
     misfit = np.concatenate([(positions - model.magnet_positions) / POSITION_SCALE, axes - frames]).ravel()
     information = float(slope @ slope)
