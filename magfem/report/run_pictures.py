@@ -55,7 +55,8 @@ def angles_picture(run: Run) -> Picture:
         for m, colour in _magnets(run):
             top.plot(steps, _deg(run, measured)[:, m], color=colour, label=f"magnet {m + 1}, measured")
             top.plot(steps, _deg(run, predicted)[:, m], color=colour, linewidth=1, linestyle=":", label="predicted")
-            top.plot(steps, _deg(run, wanted)[:, m], color=colour, linewidth=0.9, linestyle="--", label="wanted")
+            values = _deg(run, wanted)[:, m]
+            top.plot(steps, values, color=colour, linewidth=0.9, linestyle="--", drawstyle="steps-post", label="wanted")
         top.set_ylabel("angle of rotation (deg)")
         if spatial:
             apart = np.degrees(between(axes_of_rotation(measured), axes_of_rotation(wanted)))

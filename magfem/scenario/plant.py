@@ -2,31 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from magfem.actuation import CoilSystem
 from magfem.errors import MagfemError
-from magfem.rod import FlexibleSection, Rod
+from magfem.rod import Rod
 from magfem.rod.state import RodState
 from magfem.typing import Floats
-
-
-def stiffer(rod: Rod, factor: float) -> Rod:
-    """The rod with all its elastic moduli times `factor`."""
-    return Rod(
-        [
-            replace(
-                one,
-                youngs_modulus=one.youngs_modulus * factor,
-                shear_modulus=None if one.shear_modulus is None else one.shear_modulus * factor,
-            )
-            if isinstance(one, FlexibleSection)
-            else one
-            for one in rod.sections
-        ],
-        rod.base,
-        rod.magnet_fields,
-    )
 
 
 @dataclass(frozen=True, eq=False)

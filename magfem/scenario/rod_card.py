@@ -17,10 +17,10 @@
 
     [[rod.sections]]
     magnet = "disc_magnet_3x2.5"      # a magnet's card: moment, volume, length; its z along the rod
-    density = "7500 kg/m^3"           # or mass
+    density = "7500 kg/m^3"           # 7500 kg/m³ when not stated
+    model = "my_magnet.json"          # of the magnet, whose moment is taken: weaker than remanence times volume
 
-A magnet is a card, or `model`, a fitted one whose moment is taken, or a stated `moment` along the rod; these two need
-`length` and `mass`.
+Instead of a card a magnet may state its `moment` along the rod, `length` and `mass`.
 """
 
 from __future__ import annotations
@@ -29,15 +29,14 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from magfem.errors import CardError, InputError
-from magfem.fields.hull import CylinderHull
 from magfem.fields.terms import frame_about
 from magfem.fitting.model import load_model
-from magfem.geometry import Magnets, load_geometry
 from magfem.geometry.card import Table
 from magfem.geometry.vectors import three_lengths, three_numbers
 from magfem.rod import FlexibleSection, MagnetSection, Rod
+from magfem.rod.magnet_card import NEODYMIUM, magnet_section
 
-_KINDS = ("material", "magnet", "model", "moment")
+_KINDS = ("material", "magnet", "moment")
 
 
 def read_rod(card: Table) -> Rod:
@@ -73,7 +72,7 @@ def _section(entry: Table, materials: Table | None) -> FlexibleSection | MagnetS
     stated = [key for key in _KINDS if key in entry]
     if len(stated) != 1:
         got = " and ".join(stated) if stated else "none of them"
-        raise entry.error(f"a section has a material (flexible), or a magnet, model or moment (a magnet), got {got}")
+        raise entry.error(f"a section has a material (flexible), or a magnet or moment (a magnet), got {got}")
     try:
         return _flexible(entry, materials) if stated == ["material"] else _magnet(entry, stated[0])
     except CardError:
@@ -108,33 +107,20 @@ def _flexible(entry: Table, materials: Table | None) -> FlexibleSection:
 
 
 def _magnet(entry: Table, kind: str) -> MagnetSection:
-    entry.only(kind, "length", "mass", "field_points", *(["density"] if kind == "magnet" else []))
     points = entry.value("field_points") if "field_points" in entry else 1
     if isinstance(points, bool) or not isinstance(points, int):
         raise entry.error("field_points must be a whole number", "field_points")
-    length = entry.quantity("length", "length") if "length" in entry else None
-    mass = entry.quantity("mass", "mass") if "mass" in entry else None
-    moment: tuple[float, float, float]
-    if kind == "magnet":
-        device = load_geometry(entry.text("magnet"))
-        if not isinstance(device, Magnets):
-            raise entry.error("this card is not a magnet's", "magnet")
-        x, y, z = device.moment.tolist()
-        moment = (x, y, z)
-        if length is None and isinstance(device.hull, CylinderHull):
-            length = device.hull.length
-        if mass is None and "density" in entry:
-            mass = device.volume * entry.quantity("density", "density")
-    elif kind == "model":
-        model = load_model(entry.text("model"))
-        if model.unit != "T":
-            raise entry.error("this model is a coil's, and a rod carries magnets", "model")
-        x, y, z = np.asarray(model.moment, dtype=float).tolist()
-        moment = (x, y, z)
-    else:
-        moment = (0.0, 0.0, entry.quantity("moment", "moment"))
-    for key, value in (("length", length), ("mass", mass)):
-        if value is None:
-            raise entry.error(f"missing key {key}: this magnet does not say its own", key)
-    assert length is not None and mass is not None
-    return MagnetSection(length=length, moment=moment, mass=mass, field_points=points)
+    if kind == "moment":
+        entry.only("moment", "length", "mass", "field_points")
+        return MagnetSection(
+            length=entry.quantity("length", "length"),
+            moment=(0.0, 0.0, entry.quantity("moment", "moment")),
+            mass=entry.quantity("mass", "mass"),
+            field_points=points,
+        )
+    entry.only("magnet", "model", "density", "field_points")
+    model = load_model(entry.text("model")) if "model" in entry else None
+    if model is not None and model.unit != "T":
+        raise entry.error("this model is a coil's, and a rod carries magnets", "model")
+    density = entry.quantity("density", "density") if "density" in entry else NEODYMIUM
+    return magnet_section(entry.text("magnet"), density=density, model=model, field_points=points)

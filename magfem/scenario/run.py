@@ -13,7 +13,7 @@ from magfem.fitting import FieldModel
 from magfem.rod import Rod
 from magfem.scenario.angles import between
 from magfem.scenario.scenario import Scenario
-from magfem.scenario.targets import REACHED, Target
+from magfem.scenario.targets import REACHED, UNREACHABLE, Target
 from magfem.typing import Booleans, Floats, Integers, Points, Vectors
 
 
@@ -21,14 +21,16 @@ from magfem.typing import Booleans, Floats, Integers, Points, Vectors
 class Step:
     """One step of the loop: what is in use, what came of it, what was seen, what the controller makes of it.
 
-    currents (c,) A, joints (j,) rad or m.  plant, model: (n, 3) m, the centrelines of plant and model.  actual,
+    off: whether all currents were switched off just before.  currents (c,) A, joints (j,) rad or m.  plant, model: (n, 3) m, the centrelines of plant and model.  actual,
     predicted: (m, 3) unit vectors, the axes of the plant's and of the model's magnets.  places: (m, 3) m of the
     plant's.  measured: (m, 3), the axes as seen, unit.  error: rad, the largest that the controller sees.
-    condition: of the Jacobian.  seconds: that the controller took.
+    condition: of the Jacobian.  stiffness: the factor of the moduli that the model has taken on.  seconds: that the
+    controller took.
     """
 
     target: int
     outcome: str
+    off: bool
     currents: Floats
     joints: Floats
     plant: Points
@@ -39,33 +41,40 @@ class Step:
     predicted: Vectors
     error: float
     condition: float
+    stiffness: float
     seconds: float
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Ending:
-    """How a target ended.  iterations: steps of the controller until the outcome.  note: words about a failure."""
+    """How a target ended.
+
+    iterations: steps of the controller until the outcome.  note: words about a failure.  plans: other ways that were
+    planned for it, which took `planning_seconds`.
+    """
 
     target: Target
     outcome: str
     iterations: int
     last: int  # the step it ended with, counted over the whole run
     note: str = ""
+    plans: int = 0
+    planning_seconds: float = 0.0
 
     @property
     def as_expected(self) -> bool:
         """Whether it was reached, or recognised as unreachable where that was expected."""
         if self.target.expected == REACHED:
             return self.outcome == "converged"
-        return self.outcome not in ("converged", "moving", "lost branch")
+        return self.outcome == UNREACHABLE
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Run:
     """A scenario that was run.
 
-    rod: of the plant.  coil: the model that own coils were fitted with.  without_force: (steps, m, 3) axes of magnets
-    that feel torques alone, with their `centrelines` (steps, n, 3) m; NaN where there is no such equilibrium.
+    rod: of the plant.  coil: the model that own coils were fitted with.  torque_only: centrelines (steps, n, 3) m and
+    magnets' axes (steps, m, 3) if magnets felt torques alone; NaN where there is no such equilibrium.
     """
 
     scenario: Scenario

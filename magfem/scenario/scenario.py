@@ -21,7 +21,8 @@ class Scenario:
     planar: the rod, its targets and what is seen of it lie in the xz plane.  gravity: (3,) m/s².  stiffness: the
     plant's elastic moduli over the model's.  settings: of `magfem.rod.steering.Controller`.
     targets: one after the other.  start: "straight", every target from currents of zero, or "previous".  hold: steps
-    after a target is reached.  most_steps: after which a target counts as not reached.  seed: of the sensing's noise.
+    after a target is reached.  most_steps: after which a target counts as not reached.  plans: other ways that are planned
+    for one target at most.  seed: of the sensing's noise and of plans.
     compare_forces: whether the shapes without magnetic force are found as well (Fig. 2.7).
     """
 
@@ -39,5 +40,6 @@ class Scenario:
     start: str = PREVIOUS
     hold: int = 10
     most_steps: int = 400
+    plans: int = 3
     seed: int = 0
     compare_forces: bool = False

@@ -8,6 +8,7 @@
     compare_forces = true             # also the shapes without magnetic force
     hold = 10                         # steps after a target is reached
     most_steps = 400                  # for one target
+    plans = 3                         # other ways that are planned for one target at most
     start = "previous"                # or "straight": every target from currents of zero
     gravity = ["0 m/s^2", "0 m/s^2", "-9.81 m/s^2"]
 
@@ -48,6 +49,7 @@ from magfem.scenario.rod_card import read_rod
 from magfem.scenario.scenario import PREVIOUS, STRAIGHT, Scenario
 from magfem.scenario.sensing_card import read_sensing
 from magfem.scenario.targets import REACHED, UNREACHABLE, RandomTargets, Target
+from magfem.scenario.whole_numbers import whole_number
 from magfem.units import describe, quantity
 
 KIND = "scenario"
@@ -79,8 +81,8 @@ def read_scenario(card: Table) -> Scenario:
         got = describe(card.value("kind")) if "kind" in card else "none"
         raise card.error(f'a scenario is of kind "{KIND}", got {got}', "kind")
     card.only(
-        *("kind", "name", "source", "system", "planar", "compare_forces", "hold", "most_steps", "start", "gravity"),
-        *("rod", "materials", "plant", "sensing", "controller", "targets", "random"),
+        *("kind", "name", "source", "system", "planar", "compare_forces", "hold", "most_steps", "plans", "start"),
+        *("gravity", "rod", "materials", "plant", "sensing", "controller", "targets", "random"),
     )
     planar = _switch(card, "planar")
     rod = read_rod(card)
@@ -101,8 +103,9 @@ def read_scenario(card: Table) -> Scenario:
         stiffness=_stiffness(card),
         settings=_settings(card),
         start=start,
-        hold=_count(card, "hold", 10, 0),
-        most_steps=_count(card, "most_steps", 400, 1),
+        hold=whole_number(card, "hold", 10, 0),
+        most_steps=whole_number(card, "most_steps", 400, 1),
+        plans=whole_number(card, "plans", 3, 0),
         seed=seed,
         compare_forces=_switch(card, "compare_forces"),
     )
@@ -161,7 +164,7 @@ def _random(card: Table) -> RandomTargets:
         raise table.error("current must be positive", "current")
     if joint < 0:
         raise table.error("joint must not be negative", "joint")
-    return RandomTargets(_count(table, "count", 20, 1), _count(table, "seed", 0, 0), current, joint)
+    return RandomTargets(whole_number(table, "count", 20, 1), whole_number(table, "seed", 0, 0), current, joint)
 
 
 def _settings(card: Table) -> dict[str, float]:
@@ -209,11 +212,4 @@ def _switch(card: Table, key: str) -> bool:
     value = card.value(key) if key in card else False
     if not isinstance(value, bool):
         raise card.error(f"{key} must be true or false, got {describe(value)}", key)
-    return value
-
-
-def _count(table: Table, key: str, default: int, least: int) -> int:
-    value = table.value(key) if key in table else default
-    if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= 1_000_000:
-        raise table.error(f"{key} must be a whole number from {least} on, got {describe(value)}", key)
     return value

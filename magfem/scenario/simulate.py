@@ -9,9 +9,10 @@ from datetime import UTC, datetime
 import numpy as np
 
 from magfem.actuation import load_system
+from magfem.rod.stiffness_estimate import stiffened
 from magfem.scenario.loop import close_loop
 from magfem.scenario.own_coils import OwnCoils
-from magfem.scenario.plant import Plant, stiffer
+from magfem.scenario.plant import Plant
 from magfem.scenario.run import Run, Step
 from magfem.scenario.scenario import Scenario
 from magfem.scenario.scenario_file import load_scenario
@@ -35,7 +36,7 @@ def simulate(scenario: Scenario | str | os.PathLike[str]) -> Run:
     if system is None:
         assert isinstance(scenario.system, str)
         system = load_system(scenario.system)
-    rod = stiffer(scenario.rod, scenario.stiffness)
+    rod = stiffened(scenario.rod, scenario.stiffness)
     targets = scenario.targets
     if isinstance(targets, RandomTargets):
         targets = drawn(targets, rod, system, scenario.gravity, scenario.planar)

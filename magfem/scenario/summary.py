@@ -67,6 +67,9 @@ def _target(run: Run, number: int, ending: Ending) -> dict[str, Any]:
         "iterations": ending.iterations,
         "outcome": ending.outcome,
         "note": ending.note,
+        "plans": ending.plans,
+        "planning_s": ending.planning_seconds,
+        "stiffness": last.stiffness,
         "expected": ending.target.expected,
         "as_expected": ending.as_expected,
         "error_deg": np.degrees(between(reached, wanted)),
@@ -87,10 +90,8 @@ def _target(run: Run, number: int, ending: Ending) -> dict[str, Any]:
 
 
 def _largest_change(run: Run, name: str) -> float:
-    """The largest change of currents or joints from one step to the next, within a target's pursuit."""
-    values, target = run.stacked(name), run.target_of_step
-    together = target[1:] == target[:-1]
-    change = np.abs(np.diff(values, axis=0))[together]
+    """The largest change of currents or joints from one step to the next, but for those that switch all off."""
+    change = np.abs(np.diff(run.stacked(name), axis=0))[~run.stacked("off")[1:]]
     return float(change.max(initial=0.0))
 
 

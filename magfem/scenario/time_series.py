@@ -41,6 +41,8 @@ def time_series(run: Run) -> str:
     places = run.stacked("places")
     add([f"magnet_{m}_{c}_m" for m in magnets for c in COORDINATES], places.reshape(len(places), -1))
     add(["condition"], run.stacked("condition")[:, None])
+    add(["stiffness"], run.stacked("stiffness")[:, None])
+    add(["switched_off"], run.stacked("off")[:, None].astype(int))
     add(["controller_ms"], 1e3 * run.stacked("seconds")[:, None])
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
