@@ -13,19 +13,22 @@ from magfem.report.figures.style import GREY, drawing, grid
 from magfem.report.run_pictures import MAGNETS, MILLI, VIEWS, draw_rod
 from magfem.scenario.run import Run
 from magfem.scenario.summary import told_angles
+from magfem.typing import Floats
 
-_FRAMES, _PER_SECOND, _DPI = 120, 15, 75
+_FRAMES, _PER_SECOND, _DPI = 100, 12, 72
 
 
 def animation(run: Run) -> bytes:
-    """A GIF of up to about 120 pictures, evenly over the steps, each with the plant and what was wanted."""
+    """A GIF of up to 100 pictures, evenly over the steps, each with the plant and what was wanted."""
     steps = np.unique(np.linspace(0, len(run.steps) - 1, _FRAMES).round().astype(int))
     actual, wanted = told_angles(run, run.stacked("actual")), told_angles(run, run.wanted)
     lines = run.stacked("plant")
     names = ["side view"] if run.scenario.planar else ["side view", "top view"]
     with drawing():
-        drawn = Figure(figsize=(8.0, 3.4), dpi=_DPI, layout="constrained")
+        drawn = Figure(figsize=(3.6 * len(names) + 4.2, 3.6), dpi=_DPI)
         panels = drawn.subplots(1, len(names) + 1, width_ratios=[1.0] * len(names) + [1.1])
+        drawn.subplots_adjust(0.08, 0.15, 0.98, 0.91, wspace=0.25)
+        limits = {name: _square(VIEWS[name][0].project(lines) * MILLI) for name in names}
 
         def show(k: int) -> list[Any]:
             for axes, name in zip(panels, names, strict=False):
@@ -43,11 +46,7 @@ def animation(run: Run) -> bytes:
                         tuple(start),
                         arrowprops={"arrowstyle": "->", "color": MAGNETS[m % len(MAGNETS)], "linestyle": "--"},
                     )
-                flat = seen.project(lines) * MILLI
-                middle, half = (flat.max((0, 1)) + flat.min((0, 1))) / 2, 0.5 * float(np.ptp(flat, (0, 1)).max()) + 12
-                axes.set_xlim(middle[0] - half, middle[0] + half)
-                axes.set_ylim(middle[1] - half, middle[1] + half)
-                axes.set_aspect("equal")
+                axes.set(**limits[name], aspect="equal")
                 axes.set(xlabel=across, ylabel=up, title=f"{name}, step {k}")
                 grid(axes)
             last = panels[-1]
@@ -63,6 +62,14 @@ def animation(run: Run) -> bytes:
 
         moving = FuncAnimation(drawn, show, frames=steps.tolist(), init_func=lambda: [])
         return _gif(moving)
+
+
+def _square(flat: Floats) -> dict[str, tuple[float, float]]:
+    """Limits of a square about points (..., 2) mm, with room for the arrows."""
+    low, high = flat.reshape(-1, 2).min(axis=0), flat.reshape(-1, 2).max(axis=0)
+    middle, half = (low + high) / 2, float((high - low).max()) / 2 + 12
+    x, y = middle.tolist()
+    return {"xlim": (x - half, x + half), "ylim": (y - half, y + half)}
 
 
 def _gif(moving: FuncAnimation) -> bytes:

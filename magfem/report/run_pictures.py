@@ -118,6 +118,7 @@ def shapes_picture(run: Run) -> Picture:
                 label = "start" if k == chosen[0] else f"target {run.steps[k].target + 1}"
                 draw_rod(axes, VIEWS[name][0], line, run, k, colour, label)
             _true_to_scale(axes, name)
+            axes.set(**_limits(VIEWS[name][0], np.array(lines)), adjustable="box")
         handles, labels = axes.get_legend_handles_labels()
         drawn.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), 7))
         content = png(drawn)
@@ -137,7 +138,7 @@ def forces_picture(run: Run) -> Picture:
     k = int(np.nanargmax(apart))
     names = ["side view"] if run.scenario.planar else ["side view", "top view"]
     with drawing():
-        drawn = figure(3.0 if len(names) == 1 else 5.0, _WIDE)
+        drawn = figure(2.6 if len(names) == 1 else 5.0, _WIDE)
         panels = drawn.subplots(len(names), 2, squeeze=False)
         for row, name in zip(panels, names, strict=True):
             for axes, line, title in zip(row, (with_force[k], without[k]), ("with", "without"), strict=True):
@@ -170,7 +171,7 @@ def forces_angles_picture(run: Run) -> Picture:
             axes.plot(steps, actual[:, m], color=colour, label=f"magnet {m + 1}, with forces")
             axes.plot(steps, without[:, m], color=colour, linestyle="--", linewidth=1, label="without")
         axes.set_ylabel("angle of rotation (deg)")
-        _finish(drawn, [axes], run)
+        _finish(drawn, [axes], run, columns=2)
         content = png(drawn)
     return Picture(
         "forces_angles",
@@ -242,6 +243,9 @@ def _finish(drawn: Any, panels: Any, run: Run, columns: int = 3) -> None:
         axes.spines[["top", "right"]].set_visible(False)
     panels[-1].set_xlabel("step")
     handles, labels = panels[0].get_legend_handles_labels()
-    drawn.legend(handles, labels, loc="outside lower center", ncols=columns)
+    rows = -(-len(handles) // columns)
+    order = [row * columns + column for column in range(columns) for row in range(rows)]  # legends fill columns first
+    order = [k for k in order if k < len(handles)]
+    drawn.legend([handles[k] for k in order], [labels[k] for k in order], loc="outside lower center", ncols=columns)
 
 

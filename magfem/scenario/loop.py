@@ -22,6 +22,7 @@ from magfem.scenario.targets import Target
 
 log = logging.getLogger("magfem")
 
+_ATTEMPTS = 5  # to see the rod
 _IN_PLANE = 1e-4  # m that a planar scenario's rod may be off the plane
 
 
@@ -36,11 +37,20 @@ class _Loop:
     shape: RodState  # of the plant
     seen: Seen | None = None
     off: bool = True  # whether all currents were switched off just before
+    missed: int = 0  # measurements that were taken again
     steps: list[Step] = field(default_factory=list)
 
     def see(self) -> Seen:
-        """A measurement of the plant."""
-        self.seen = self.scenario.sensing.see(self.shape, self.rng, self.seen)
+        """A measurement of the plant; pictures that show no rod are taken again. Raises ConvergenceError at last."""
+        for attempt in range(_ATTEMPTS):
+            try:
+                self.seen = self.scenario.sensing.see(self.shape, self.rng, self.seen)
+                break
+            except ConvergenceError:
+                self.missed += 1
+                if attempt == _ATTEMPTS - 1:
+                    raise
+        assert self.seen is not None
         return in_plane(self.seen) if self.scenario.planar else self.seen
 
     def step(self, controller: Controller, now: Steering, number: int) -> Steering:
@@ -88,8 +98,8 @@ class _Loop:
 
 def close_loop(
     scenario: Scenario, system: CoilSystem, plant: Plant, targets: Sequence[Target]
-) -> tuple[list[Step], list[Ending]]:
-    """Steer the plant to one target after the other.
+) -> tuple[list[Step], list[Ending], int]:
+    """Steer the plant to one target after the other; also how many measurements had to be taken again.
 
     Raises ConvergenceError when the plant has no stable shape without currents, and as `Rod.solve` does.
     """
@@ -111,7 +121,7 @@ def close_loop(
         now, ending = _pursue(loop, controller, now, number, target)
         endings.append(ending)
         log.info("scenario: target %d of %d: %s", number + 1, len(targets), _words(ending))
-    return loop.steps, endings
+    return loop.steps, endings, loop.missed
 
 
 def controller_for(scenario: Scenario, system: CoilSystem, target: Target) -> Controller:

@@ -73,7 +73,7 @@ class Ending:
 class Run:
     """A scenario that was run.
 
-    rod: of the plant.  coil: the model that own coils were fitted with.  torque_only: centrelines (steps, n, 3) m and
+    rod: of the plant.  missed: measurements that had to be taken again.  coil: the model that own coils were fitted with.  torque_only: centrelines (steps, n, 3) m and
     magnets' axes (steps, m, 3) if magnets felt torques alone; NaN where there is no such equilibrium.
     """
 
@@ -82,6 +82,7 @@ class Run:
     rod: Rod
     steps: Sequence[Step]
     endings: Sequence[Ending]
+    missed: int = 0
     coil: FieldModel | None = None
     torque_only: tuple[Points, Vectors] | None = None
     provenance: dict[str, Any] = field(default_factory=dict)

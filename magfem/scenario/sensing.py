@@ -6,7 +6,9 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline
 
+from magfem.errors import ConvergenceError
 from magfem.rod.camera_views import fit_centreline_to_views, simulate_views
 from magfem.rod.cameras import Camera
 from magfem.rod.centreline import Centreline
@@ -63,15 +65,31 @@ class Cameras:
     degree: int = 4
 
     def see(self, plant: RodState, rng: np.random.Generator, before: Seen | None) -> Seen:
-        """As `Sensing.see`. A magnet's turn about the rod's axis is not seen: its frame is the least turned one."""
+        """As `Sensing.see`. A magnet's turn about the rod's axis is not seen: its frame is the least turned one.
+
+        Raises ConvergenceError when no centreline fits the pictures.
+        """
         axis = _points_on_axis(plant, self.points)
         views = [
             simulate_views(self.cameras, axis, rng, noise=self.noise, outliers=self.outliers)
             for _ in range(self.pictures)
         ]
         pixels = [np.concatenate([view[c].pixels for view in views]) for c in range(len(self.cameras))]
+        start = None if before is None else before.centreline
+        try:
+            fitted = self._fitted(plant, pixels, start)
+        except ConvergenceError:
+            if start is None:
+                raise
+            fitted = self._fitted(plant, pixels, None)
         base = plant.rod.base
-        fitted = fit_centreline_to_views(
+        middle = plant.arc_lengths[plant.loads.chain.magnet_node]
+        return Seen(fitted.position(middle), fitted.frames(middle, base.rotation), fitted)
+
+    def _fitted(self, plant: RodState, pixels: list[Floats], start: Centreline | None) -> Centreline:
+        """The centreline in the pictures; of the plant only what is known of the rod without load is used."""
+        base = plant.rod.base
+        return fit_centreline_to_views(
             self.cameras,
             pixels,
             plant.rod.length,
@@ -79,10 +97,8 @@ class Cameras:
             base_tangent=base.rotation.as_matrix()[:, 2],
             straight=_rigid_stretches(plant),
             degree=self.degree,
-            start=None if before is None else before.centreline,
+            start=start,
         )
-        middle = plant.arc_lengths[plant.loads.chain.magnet_node]
-        return Seen(fitted.position(middle), fitted.frames(middle, base.rotation), fitted)
 
     def describe(self) -> str:
         """In a few words."""
@@ -106,8 +122,6 @@ def in_plane(seen: Seen) -> Seen:
 
 def _points_on_axis(plant: RodState, count: int) -> Points:
     """(count, 3) m, evenly spaced from base to tip: cubic between nodes, with their tangents."""
-    from scipy.interpolate import CubicHermiteSpline
-
     s = plant.arc_lengths
     curve = CubicHermiteSpline(s, plant.positions, plant.frames[:, :, 2])
     points: Points = curve(np.linspace(s[0], s[-1], count))

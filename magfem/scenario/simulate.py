@@ -42,7 +42,7 @@ def simulate(scenario: Scenario | str | os.PathLike[str]) -> Run:
         targets = drawn(targets, rod, system, scenario.gravity, scenario.planar)
     log.info("scenario: steering %d magnets by %d coils", len(rod.magnets), len(system.coils))
     plant = Plant(rod, system, scenario.gravity)
-    steps, endings = close_loop(scenario, system, plant, targets)
+    steps, endings, missed = close_loop(scenario, system, plant, targets)
     torque_only = None
     if scenario.compare_forces:
         log.info("scenario: the same currents without magnetic force")
@@ -53,6 +53,7 @@ def simulate(scenario: Scenario | str | os.PathLike[str]) -> Run:
         rod=rod,
         steps=steps,
         endings=endings,
+        missed=missed,
         coil=coil,
         torque_only=torque_only,
         provenance={

@@ -29,6 +29,7 @@ def summary(run: Run) -> dict[str, Any]:
         "targets": [_target(run, number, ending) for number, ending in enumerate(run.endings)],
         "step_ms": {"median": 1e3 * float(np.median(seconds)), "worst": 1e3 * float(seconds.max())},
         "steps": len(run.steps),
+        "missed_measurements": run.missed,
         "system": {
             "name": run.system.name,
             "coils": [one.name for one in run.system.coils],
