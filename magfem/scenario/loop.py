@@ -89,7 +89,8 @@ class _Loop:
             return "the plant leaves the system's region, or has no stable shape near"
         self.shape = found
         away = float(np.abs(found.positions[:, 1]).max())
-        return "the plant buckles out of its plane" if self.scenario.planar and away > _IN_PLANE else ""
+        buckled = self.scenario.planar and away > _IN_PLANE and not now.route
+        return "the plant buckles out of its plane" if buckled else ""
 
     def switch_off(self) -> None:
         """All currents to zero at once; the plant goes to rest."""
@@ -117,7 +118,10 @@ def close_loop(
             if not loop.steps:  # a step that nobody follows, so that none that is timed compiles
                 controller.advance(now, rest.magnet_positions, rest.magnet_frames)
         else:
-            now = replace(now, outcome="moving", best=np.inf, since=0, expected=None, route=(), plans=0)
+            # Where the last target was missed, the plant may be on any branch: it goes by way of currents of zero.
+            missed = endings[-1].outcome != "converged"
+            route = (np.zeros(now.parameters.size),) if missed else ()
+            now = replace(now, outcome="moving", best=np.inf, since=0, expected=None, route=route, plans=0)
         now, ending = _pursue(loop, controller, now, number, target)
         endings.append(ending)
         log.info("scenario: target %d of %d: %s", number + 1, len(targets), _words(ending))
