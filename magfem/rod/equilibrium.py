@@ -26,6 +26,7 @@ _LARGEST_TURN = 1.0  # rad, of any cross-section in one step
 _LARGEST_PREDICTED = 0.3  # rad, of any cross-section
 _ROUNDING = 1e-11  # of the energy: smaller changes say nothing
 _ESCAPES = 8
+_SHARPENED = 4
 _BLOCKED = 12  # steps in a row that the edge of what is allowed has shortened
 
 
@@ -86,6 +87,7 @@ def find_equilibrium(
             if damping:
                 system = factored(chain, here.shape, here.acting, loads.coupled)
                 damping = 0.0
+            system = _sharpened(system, loads, R_base, p_base)
             if system.negative == 0 or not leave_saddles or escapes == _ESCAPES:
                 return Equilibrium(system, iterations, "unstable" if system.negative else "stable")
             escapes += 1
@@ -117,6 +119,25 @@ def find_equilibrium(
         damping = damping / 8 if taken == 1.0 else damping if taken > 0.2 else max(4 * damping, 1e-3)
         if damping < 1e-4:
             damping = 0.0
+
+
+def _sharpened(system: Factored, loads: Loads, R_base: Floats, p_base: Points) -> Factored:
+    """An equilibrium with negative eigenvalues, by Newton's method to rounding.
+
+    A turn that no load resists has an eigenvalue of zero, give or take what is left of the gradient.
+    """
+    for _ in range(_SHARPENED):
+        if not system.negative:
+            return system
+        step, moved = system.step(-system.gradient)
+        if not np.abs(moved[:, :3]).max() < _LARGEST_PREDICTED:
+            return system
+        shape = shape_of(system.chain, system.shape.twist + step, R_base, p_base)
+        closer = factored(system.chain, shape, loads.act(shape.R, shape.p), loads.coupled)
+        if not closer.residual < system.residual:
+            return system
+        system = closer
+    return system
 
 
 def _search(
@@ -202,7 +223,7 @@ def relax(
         shape = shape_of(chain, twist, R_base, p_base)
         system = factored(chain, shape, loads.act(shape.R, shape.p), loads.coupled, damping)
         if system.residual <= tolerance:
-            system = factored(chain, shape, system.acting, loads.coupled)
+            system = _sharpened(factored(chain, shape, system.acting, loads.coupled), loads, R_base, p_base)
             return Equilibrium(system, iterations, "unstable" if system.negative else "stable")
         if iterations == most_iterations:
             return Equilibrium(system, iterations, "iterations")

@@ -15,8 +15,8 @@ from magfem.typing import ArrayLike, Floats
 Curvature: TypeAlias = ArrayLike | Callable[[Floats], Floats]
 """(3,) 1/m, or a function of arc length (n,) m from the section's start that gives (n, 3)."""
 
-ELEMENTS, MAGNETIC_ELEMENTS = 16, 256
-"""Of a flexible section, by default; and of a hard-magnetic one, whose torques act at the nodes."""
+ELEMENTS, TORQUE_ELEMENTS, MAGNETIC_ELEMENTS = 16, 64, 256
+"""Of a flexible section, by default; of one with moments per length, and of a hard-magnetic one: these act at the nodes."""
 
 
 @dataclass(frozen=True)
@@ -70,8 +70,8 @@ class FlexibleSection:
     intrinsic_curvature: (3,) 1/m without load, in the section's axes, or a function of arc length; its third component
     is twist.  intrinsic_strain: (3,), dp/ds in the section's axes without load.  force_per_length: (3,) N/m and
     moment_per_length: (3,) N, in world axes, whatever the shape.  magnetic_moment_per_length: (3,) A·m in the section's
-    axes, of a hard-magnetic section.  elements: how many it is divided into (default 16, hard-magnetic 256); the shape's error falls with their fourth
-    power, that of a hard-magnetic section's torques with their square.
+    axes, of a hard-magnetic section.  elements: how many it is divided into (default 16, with moments per length 64, hard-magnetic 256); the
+    shape's error falls with their fourth power, that of torques along the section with their square.
     Source of the constitutive law: dissertation, eq. 2.2; K = diag(EI_x, EI_y, GJ), diag(GA, GA, EA).
     """
 
@@ -118,7 +118,9 @@ class FlexibleSection:
         """How many elements it is divided into."""
         if self.elements is not None:
             return self.elements
-        return MAGNETIC_ELEMENTS if np.any(np.asarray(self.magnetic_moment_per_length, float)) else ELEMENTS
+        if np.any(np.asarray(self.magnetic_moment_per_length, float)):
+            return MAGNETIC_ELEMENTS
+        return TORQUE_ELEMENTS if np.any(np.asarray(self.moment_per_length, float)) else ELEMENTS
 
     @property
     def section(self) -> CrossSection:
