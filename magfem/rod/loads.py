@@ -58,8 +58,8 @@ class Loads:
 
     @cached_property
     def dead_couple(self) -> Floats:
-        """(e + 1, 3) N·m, of −c·(R ẑ)."""
-        return self.chain.axial_weight[:, None] * self.gravity + self.chain.couple
+        """(e + 1, 3, 3) N·m, of −Σ c_ij R_ij."""
+        return self.gravity[:, None] * self.chain.end_weight[:, None, :] + self.chain.couple
 
     @cached_property
     def conservative(self) -> bool:
