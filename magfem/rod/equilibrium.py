@@ -239,9 +239,20 @@ def relax(
         before = system.residual
 
 
-def predicted(before: Factored, loads: Loads) -> Floats:
-    """Twists (e, 12) near the equilibrium under other loads, by how an equilibrium answers to small ones."""
+def predicted(before: Factored, loads: Loads) -> tuple[Floats, float]:
+    """Twists (e, 12) near the equilibrium under other loads, by how an equilibrium answers to small ones.
+
+    And by how much, rad, any cross-section should turn. Where that is much, prediction is of no use: the twists are
+    those of before.
+    """
     shape = before.shape
     change = loads.act(shape.R, shape.p).wrench - before.acting.wrench
     step, moved = before.step(node_load=change)
-    return shape.twist + step if np.abs(moved[:, :3]).max() < _LARGEST_PREDICTED else shape.twist
+    turn = float(np.abs(moved[:, :3]).max())
+    return (shape.twist + step if turn < _LARGEST_PREDICTED else shape.twist), turn
+
+
+def largest_turn(before: Floats, after: Floats) -> float:
+    """rad, the most that any of the frames (n, 3, 3) has turned."""
+    least = float(np.einsum("nij,nij->n", before, after).min())
+    return float(np.arccos(np.clip((least - 1) / 2, -1.0, 1.0)))

@@ -18,9 +18,13 @@ if TYPE_CHECKING:
     from magfem.fields.field import Field
     from magfem.rod.applied_field import Driven
     from magfem.rod.chain import Chain
+    from magfem.rod.factored import Factored
     from magfem.rod.state import RodState
 
 Section = FlexibleSection | MagnetSection
+
+SNAP = 0.25
+"""rad: smaller turns from a guess are no snap."""
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -134,10 +138,11 @@ class Rod:
             interaction,
         )
         R, p = self._base
+        expected = np.inf
         if guess is None:
             start = chain.rest
         elif guess.rod is self and guess.stable:
-            start = predicted(guess.factored, loads)
+            start, expected = predicted(guess.factored, loads)
         else:
             start = _start(guess, chain)
         region = None if loads.applied is None or outside == "extrapolate" else loads.applied.region
@@ -149,7 +154,8 @@ class Rod:
             found = find_equilibrium(chain, loads, R, p, start, tolerance, most_iterations, leave_saddles, allowed)
         else:
             found = relax(chain, loads, R, p, start, tolerance, most_iterations)
-        state = RodState(self, loads, found)
+        snapped = guess is not None and expected < np.inf and _snapped(guess, found.factored, expected)
+        state = RodState(self, loads, found, snapped)
         if strict and found.outcome == "outside" and region is not None:
             raise OutsideRegionError(
                 f"a magnet is pulled out of the field's region ({region.describe()}) before the rod finds an "
@@ -173,6 +179,14 @@ class Rod:
     @cached_property
     def _base(self) -> tuple[Floats, Floats]:
         return np.ascontiguousarray(self.base.rotation.as_matrix()), np.array(self.base.translation)
+
+
+def _snapped(guess: RodState, found: Factored, expected: float) -> bool:
+    """Whether the rod turned far more than the guess's own answer to the change of loads."""
+    from magfem.rod.equilibrium import largest_turn
+
+    turned = largest_turn(guess.frames, found.shape.R)
+    return turned > max(SNAP, 4 * expected)
 
 
 def _start(guess: RodState, chain: Chain) -> Floats:

@@ -55,7 +55,7 @@ def test_show_tells_of_wire_and_resistance(here: Path, capsys: pytest.CaptureFix
     assert shown["volume"] == geometry.volume
     one = shown["circuits"]["coil"]
     assert one["turns"] == 24
-    assert one["length"] * 100e-6 * 9e-6 == pytest.approx(geometry.volume)
+    assert one["length"] * 100e-6 * 9e-6 == pytest.approx(geometry.volume, rel=1e-12, abs=0)
     assert one["resistance_estimate"] == pytest.approx(10.2, rel=0.01)
     assert Path(f"{SPIRAL}.png").read_bytes().startswith(b"\x89PNG")
     lines = text(capsys, "show", SPIRAL)
@@ -67,7 +67,7 @@ def test_show_counts_the_bodies_of_an_assembly(here: Path, capsys: pytest.Captur
     shown = output(capsys, "show", "halbach_array_5")
     assert len(shown["bodies"]) == 5
     assert shown["hull"]["kind"] == "box"
-    assert sum(body["volume"] for body in shown["bodies"]) == pytest.approx(shown["volume"])
+    assert sum(body["volume"] for body in shown["bodies"]) == pytest.approx(shown["volume"], rel=1e-12, abs=0)
 
 
 def test_mesh_is_the_surface_of_the_conductors(here: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -64,7 +64,7 @@ def winding(inner: float, outer: float, length: float, centre: float, turns: flo
 def test_loops_of_filaments_follow_maxwell():
     for radius, distance in ((30e-3, 10e-3), (10e-3, 40e-3), (20e-3, 20e-3)):
         matrix = inductance_matrix([polygon(20e-3, 0.0), winding(radius, radius, 0.0, distance, 3.0)])
-        assert matrix[0, 1] == pytest.approx(3 * loops_mutual_inductance(20e-3, radius, distance), rel=2e-4)
+        assert matrix[0, 1] == pytest.approx(3 * loops_mutual_inductance(20e-3, radius, distance), rel=2e-4, abs=0)
     # Both of filaments
     pair = inductance_matrix([polygon(20e-3, 0.0), polygon(30e-3, 10e-3)])
     assert pair[0, 1] == pytest.approx(loops_mutual_inductance(20e-3, 30e-3, 10e-3), rel=2e-4)
@@ -76,7 +76,7 @@ def test_solenoids_of_patches_follow_nagaoka(shape):
     radius = 10e-3
     length = 2 * radius / shape
     expected = MU_0 * math.pi * radius**2 * 50**2 / length * nagaoka_coefficient(radius, length)
-    assert expected == pytest.approx(sheet_inductance(radius, length, 50), rel=1e-12)
+    assert expected == pytest.approx(sheet_inductance(radius, length, 50), rel=1e-12, abs=0)
     matrix = inductance_matrix([tube(radius, length, 50)])
     assert matrix[0, 0] == pytest.approx(expected, rel=3e-4)
 
@@ -112,7 +112,7 @@ def test_reciprocity_of_unlike_circuits():
         for other, second in circuits.items():
             if name < other:
                 there, back = both_ways(first, second)
-                assert there == pytest.approx(back, rel=2e-4), (name, other)
+                assert there == pytest.approx(back, rel=2e-4, abs=0), (name, other)
 
 
 def test_reciprocity_of_a_racetrack():
@@ -167,7 +167,7 @@ def test_stator_stores_energy_whatever_its_currents(stator_inductance):
     solution, currents = solved("stator_1.6x5.5", 0.5), np.array([0.7, -1.3])
     (first, mutual), (_, second) = stator_inductance
     expected = 0.5 * (first * 0.49 + second * 1.69) - mutual * 0.91
-    assert solution.energy(currents) == pytest.approx(expected, rel=1e-12)
+    assert solution.energy(currents) == pytest.approx(expected, rel=1e-12, abs=0)
 
 
 def sphere(direction: Floats) -> SphereMagnet:

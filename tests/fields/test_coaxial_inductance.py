@@ -47,7 +47,7 @@ def test_loops_match_neumanns_integral():
             return value
 
         exact = MU_0 * a * b * quad(neumann, 0, np.pi, epsabs=0, epsrel=1e-12)[0]
-        assert loops_mutual_inductance(a, b, z) == pytest.approx(exact, rel=1e-12)
+        assert loops_mutual_inductance(a, b, z) == pytest.approx(exact, rel=1e-12, abs=0)
 
 
 def test_loops_far_apart_and_nearly_coincident():
@@ -69,21 +69,21 @@ def test_nagaoka_limits():
     assert nagaoka_coefficient(q, 1.0) == pytest.approx(1 - 8 / (3 * np.pi) * q + q**2 / 2, abs=1e-14)
     for length in (1e-3, 1e-6, 1e-9):
         assert sheet_inductance(1.0, length) == pytest.approx(
-            MU_0 * (np.log(8 / length) - 0.5 + length**2 / 32 * (np.log(8 / length) + 0.25)), rel=1e-10
+            MU_0 * (np.log(8 / length) - 0.5 + length**2 / 32 * (np.log(8 / length) + 0.25)), rel=1e-10, abs=0
         )
     lengths = 0.02 / np.sqrt(1 - 1e-4) * (1 + np.array([-2e-9, -1e-9, 1e-9, 2e-9]))
     steps = np.diff([nagaoka_coefficient(1.0, length) for length in lengths])
-    assert steps[1] == pytest.approx(steps[0] + steps[2], rel=1e-2)
+    assert steps[1] == pytest.approx(steps[0] + steps[2], rel=1e-2, abs=0)
 
 
 @pytest.mark.parametrize(("radius", "length"), [(0.01, 0.03), (1.0, 0.01), (1.0, 100.0)])
 def test_winding_of_no_thickness_is_a_sheet(radius, length):
     sheet = CoaxialWinding(radius, radius, length, 7)
-    assert self_inductance(sheet) == pytest.approx(sheet_inductance(radius, length, 7), rel=1e-8)
+    assert self_inductance(sheet) == pytest.approx(sheet_inductance(radius, length, 7), rel=1e-8, abs=0)
     # A layer of thickness t has π t/(3l) less than the sheet, in units of µ0 R.
     half = 1e-8 * min(radius, length)
     thin = CoaxialWinding(radius - half, radius + half, length, 7)
-    assert self_inductance(thin) == pytest.approx(sheet_inductance(radius, length, 7), rel=1e-7)
+    assert self_inductance(thin) == pytest.approx(sheet_inductance(radius, length, 7), rel=1e-7, abs=0)
 
 
 def test_brooks_coil():
@@ -105,21 +105,21 @@ def test_self_inductance_is_the_sum_over_its_parts(section):
     middle = inner + 0.4 * (outer - inner)
     one, other = CoaxialWinding(inner, middle, length, 0.8), CoaxialWinding(middle, outer, length, 1.2)
     parts = self_inductance(one) + self_inductance(other) + 2 * mutual_inductance(one, other)
-    assert parts == pytest.approx(whole, rel=1e-7)
+    assert parts == pytest.approx(whole, rel=1e-7, abs=0)
 
 
 @pytest.mark.parametrize("other", OTHERS.values(), ids=OTHERS)
 def test_mutual_inductance_is_reciprocal(other):
-    assert mutual_inductance(USUAL, other) == pytest.approx(mutual_inductance(other, USUAL), rel=1e-7)
+    assert mutual_inductance(USUAL, other) == pytest.approx(mutual_inductance(other, USUAL), rel=1e-7, abs=0)
 
 
 def test_mutual_inductance_of_filaments_and_of_dipoles():
     one, other = CoaxialWinding(1, 1, 0, 3), CoaxialWinding(0.5, 0.5, 0, 5, 0.7)
-    assert mutual_inductance(one, other) == pytest.approx(15 * loops_mutual_inductance(1, 0.5, 0.7), rel=1e-12)
+    assert mutual_inductance(one, other) == pytest.approx(15 * loops_mutual_inductance(1, 0.5, 0.7), rel=1e-12, abs=0)
     area = np.pi * (10e-3**2 + 150e-6 + 15e-3**2) / 3
     far = CoaxialWinding(10e-3, 15e-3, 30e-3, 100, 50.0)
     dipoles = MU_0 * (100 * area) ** 2 / (2 * np.pi * 50.0**3)
-    assert mutual_inductance(USUAL, far) == pytest.approx(dipoles, rel=1e-5)
+    assert mutual_inductance(USUAL, far) == pytest.approx(dipoles, rel=1e-5, abs=0)
 
 
 @pytest.mark.parametrize("ratio", [0.01, 0.05, 0.2])
@@ -148,7 +148,7 @@ def test_round_wire_matches_its_integral(ratio):
 
 def test_loop_potential_is_maxwells():
     a = loop_vector_potential([0.5, 0, 0.7], 1.0)
-    assert 2 * np.pi * 0.5 * a[1] == pytest.approx(float(loops_mutual_inductance(1.0, 0.5, 0.7)), rel=1e-14)
+    assert 2 * np.pi * 0.5 * a[1] == pytest.approx(float(loops_mutual_inductance(1.0, 0.5, 0.7)), rel=1e-14, abs=0)
 
 
 def test_bad_coils_are_refused():

@@ -135,7 +135,7 @@ def test_distance_broadcasts_and_takes_single_no_and_undefined_points(hull):
 
 @polytopes
 def test_radius_is_that_of_the_farthest_corner_from_the_origin(hull):
-    assert hull.radius == pytest.approx(np.linalg.norm(corners_of(hull), axis=1).max(), rel=1e-14)
+    assert hull.radius == pytest.approx(np.linalg.norm(corners_of(hull), axis=1).max(), rel=1e-14, abs=0)
 
 
 @hulls

@@ -70,7 +70,7 @@ def test_cards_are_coils_whose_metal_is_area_times_thickness(name: str) -> None:
     coil = load_geometry(name)
     assert isinstance(coil, Coil) and not coil.axisymmetric
     parts = [part for circuit in coil.circuits for part in circuit.parts]
-    assert coil.volume == pytest.approx(sum(part.area * part.thickness for part in parts), rel=1e-14)
+    assert coil.volume == pytest.approx(sum(part.area * part.thickness for part in parts), rel=1e-14, abs=0)
     assert coil.source
 
 
@@ -89,8 +89,8 @@ def test_the_planar_coil_of_chapter_5() -> None:
     length = quad(lambda angle: np.hypot(5.95e-3 - pitch * angle / (2 * pi), pitch / (2 * pi)), 0, 48 * pi)[0]
     part = track(coil)
     assert part.length == pytest.approx(length, rel=1e-9)
-    assert part.area == pytest.approx(length * 1e-4, rel=1e-9)
-    assert coil.smallest_gap == pytest.approx(pitch - 1e-4, rel=1e-12)
+    assert part.area == pytest.approx(length * 1e-4, rel=1e-9, abs=0)
+    assert coil.smallest_gap == pytest.approx(pitch - 1e-4, rel=1e-12, abs=0)
     assert coil.hull == CylinderHull(12e-3, 9e-6)
     assert coil.region.clearance == 0.2e-3 and coil.region.extent == 6e-3
     assert length / (COPPER * 1e-4 * 9e-6) == pytest.approx(10.11, abs=0.01)  # Ω; the dissertation states 12
@@ -215,7 +215,7 @@ def test_layers_are_stacked_in_series_about_the_middle() -> None:
     heights = [part.stations(0.5).left[0, 2] for part in circuit.parts]
     np.testing.assert_allclose(heights, [-59e-6, 59e-6], rtol=1e-12)
     single = load_geometry("planar_coil_12mm")
-    assert coil.volume == pytest.approx(2 * single.volume)
+    assert coil.volume == pytest.approx(2 * single.volume, rel=1e-12, abs=0)
     assert coil.hull == CylinderHull(12e-3, 127e-6)
 
 

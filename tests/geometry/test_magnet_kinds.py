@@ -75,10 +75,12 @@ def test_solids_have_the_closed_volumes_and_areas(magnets: MagneticSolids, occ: 
     bodies = {body.name: body for body in magnets.bodies}
     assert list(solids) == list(bodies)
     for name, (tag,) in solids.items():
-        assert occ.getMass(3, tag) == pytest.approx(bodies[name].volume, rel=1e-9)
+        assert occ.getMass(3, tag) == pytest.approx(bodies[name].volume, rel=1e-9, abs=0)
         _, faces = occ.getSurfaceLoops(tag)
-        assert sum(occ.getMass(2, face) for face in np.concatenate(faces)) == pytest.approx(bodies[name].area, rel=1e-9)
-    assert sum(occ.getMass(3, tag) for (tag,) in solids.values()) == pytest.approx(magnets.volume, rel=1e-9)
+        assert sum(occ.getMass(2, face) for face in np.concatenate(faces)) == pytest.approx(
+            bodies[name].area, rel=1e-9, abs=0
+        )
+    assert sum(occ.getMass(3, tag) for (tag,) in solids.values()) == pytest.approx(magnets.volume, rel=1e-9, abs=0)
 
 
 @pytest.mark.parametrize("magnets", ALL, ids=IDS)
@@ -157,7 +159,7 @@ def test_which_are_axisymmetric() -> None:
 def test_half_sections_turned_about_the_axis_are_the_solids(magnets: MagneticSolids, occ: Any) -> None:
     for (tag,), body in zip(magnets.build_meridian(occ).values(), magnets.bodies, strict=True):
         rho, _, _ = occ.getCenterOfMass(2, tag)
-        assert 2 * pi * rho * occ.getMass(2, tag) == pytest.approx(body.volume, rel=1e-9)  # Pappus
+        assert 2 * pi * rho * occ.getMass(2, tag) == pytest.approx(body.volume, rel=1e-9, abs=0)  # Pappus
 
 
 @pytest.mark.parametrize("magnets", ALL, ids=IDS)
@@ -386,7 +388,7 @@ def test_bad_assemblies_name_file_and_key(rest: str, message: str, key: str) -> 
 
 def test_assemblies_beyond_rounding_are_refused() -> None:
     block = BlockMagnet(size=(2e-3, 2e-3, 2e-3), material=N48)
-    assert MagnetAssembly(magnets=(PlacedMagnet(block, (1e3, 0, 0)),)).volume == pytest.approx(8e-9)
+    assert MagnetAssembly(magnets=(PlacedMagnet(block, (1e3, 0, 0)),)).volume == pytest.approx(8e-9, rel=1e-12, abs=0)
     with pytest.raises(InputError, match='position of "magnet_1" must lie within 2 km of the origin'):
         MagnetAssembly(magnets=(PlacedMagnet(block, (0, -1e6, 0)),))
 
@@ -404,7 +406,7 @@ def test_magnets_may_touch() -> None:
         np.linalg.norm(np.cross(mesh.points[b] - mesh.points[a], mesh.points[c] - mesh.points[a])) / 2
         for a, b, c in shared[0] & shared[1]
     )
-    assert area == pytest.approx(16e-6, rel=1e-9)
+    assert area == pytest.approx(16e-6, rel=1e-9, abs=0)
 
 
 def test_a_pin_in_a_bore_does_not_overlap_and_too_thick_a_one_does() -> None:

@@ -57,9 +57,9 @@ def test_volume_area_and_moment_are_those_of_the_block(card):
     magnets = card()
     (body,) = magnets.bodies
     assert body.name == "magnet"
-    assert body.volume == pytest.approx(24e-9, rel=1e-12) and body.area == pytest.approx(52e-6, rel=1e-12)
+    assert body.volume == pytest.approx(24e-9, rel=1e-12, abs=0) and body.area == pytest.approx(52e-6, rel=1e-12, abs=0)
     assert magnets.moment == pytest.approx([0, 0, 1.3 * 24e-9 / (4e-7 * np.pi)], rel=1e-9)
-    assert magnets.hull.radius == pytest.approx(np.sqrt(29) / 2 * 1e-3, rel=1e-12)
+    assert magnets.hull.radius == pytest.approx(np.sqrt(29) / 2 * 1e-3, rel=1e-12, abs=0)
 
 
 def test_solutions_and_models_carry_the_surfaces(card, tmp_path):
@@ -85,7 +85,7 @@ def test_origin_moves_the_mesh(card):
 
 def test_numbers_stand_for_names(card):
     ids = {"cell_data": {"material": [np.array([3, 3, 3, 0, 0, 0])]}}
-    assert card(own="id = 3", **ids).volume == pytest.approx(12e-9)
+    assert card(own="id = 3", **ids).volume == pytest.approx(12e-9, rel=1e-12, abs=0)
     with pytest.raises(CardError, match=r"give body 'magnet' its number.* the file has 0, 3"):
         card(**ids)
     with pytest.raises(CardError, match="no cells have the number 4"):
@@ -98,14 +98,16 @@ def test_bodies_that_touch_share_their_facets(card, tmp_path):
         card(file="part.inp", body="nort", **sets)
     with pytest.raises(CardError, match="does not say what these bodies of the file are: south"):
         card(file="part.inp", body="north", **sets)
-    assert card(file="part.inp", body="north", more='ignore = ["south"]', **sets).volume == pytest.approx(12e-9)
+    assert card(file="part.inp", body="north", more='ignore = ["south"]', **sets).volume == pytest.approx(
+        12e-9, rel=1e-12, abs=0
+    )
     text = (tmp_path / "card.toml").read_text().replace('ignore = ["south"]', "")
     text += '[bodies.south]\nremanence = "1 T"\nmagnetisation = [1, 0, 0]\n'
     (tmp_path / "card.toml").write_text(text)
     both = load_geometry(tmp_path / "card.toml")
     surfaces = both.surfaces
     shared = (surfaces.inner >= 0) & (surfaces.outer >= 0)
-    assert shared.sum() == 2 and both.volume == pytest.approx(24e-9)
+    assert shared.sum() == 2 and both.volume == pytest.approx(24e-9, rel=1e-12, abs=0)
 
 
 @pytest.mark.parametrize(
@@ -178,7 +180,7 @@ def test_bodies_inside_others_need_a_cavity(card, tmp_path):
             with pytest.raises(CardError, match=message):
                 card(**more)
         else:
-            assert card(**more).volume == pytest.approx((24 - 3 + 24 / 64) * 1e-9, rel=1e-12)
+            assert card(**more).volume == pytest.approx((24 - 3 + 24 / 64) * 1e-9, rel=1e-12, abs=0)
 
 
 def test_cells_of_nodes_that_are_not_there_are_refused(card):
@@ -212,7 +214,9 @@ def test_names_that_need_quotes_are_written_with_them(card):
 def test_inward_triangles_are_turned(card):
     inward = np.array([[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]])
     corners = np.vstack([np.zeros(3), np.eye(3)])
-    assert card(file="part.stl", cells=[("triangle", inward)], points=corners).volume == pytest.approx(1e-9 / 6)
+    assert card(file="part.stl", cells=[("triangle", inward)], points=corners).volume == pytest.approx(
+        1e-9 / 6, rel=1e-12, abs=0
+    )
 
 
 def test_units_are_required(card, tmp_path):

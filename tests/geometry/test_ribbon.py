@@ -74,7 +74,7 @@ def test_area_of_straight_tracks_by_the_polygon_of_their_edges(name: str) -> Non
     stations = track.stations(1.0)
     last = 2 * int(np.flatnonzero(~stations.lead)[-1]) + 3
     x, y = np.concatenate([stations.right[:last], stations.left[last - 1 :: -1]])[:, :2].T
-    assert 0.5 * (x @ np.roll(y, -1) - y @ np.roll(x, -1)) == pytest.approx(track.area, rel=1e-12)
+    assert 0.5 * (x @ np.roll(y, -1) - y @ np.roll(x, -1)) == pytest.approx(track.area, rel=1e-12, abs=0)
 
 
 @pytest.mark.parametrize("name", FLAT_CARDS)
@@ -122,7 +122,7 @@ def test_layers_offset_along_leaning_normals_stay_parallel_at_folds() -> None:
         plane = unit(np.cross(stations.left[b] - stations.left[a], stations.left[a] - stations.right[a]))
         plane *= np.sign(plane @ stations.normal[a + 1])
         for i in (a, b):
-            assert height * plane @ stations.normal[i] == pytest.approx(height, rel=1e-12)
+            assert height * plane @ stations.normal[i] == pytest.approx(height, rel=1e-12, abs=0)
             checked += np.linalg.norm(stations.normal[i]) > 1.4
     assert checked == 6  # four folds, seen from either side but for the turns'
 
@@ -173,7 +173,7 @@ def test_return_strips_keep_off_themselves(turns: int, strands: int) -> None:
             np.concatenate([stations.left[2 * n : 2 * n + 3], stations.right[2 * n : 2 * n + 3][::-1]]) for n in low
         ]
         shapes = [Polygon(quad[:, :2]) for quad in quads]
-        assert unary_union(shapes).area == pytest.approx(sum(shape.area for shape in shapes), rel=1e-6)
+        assert unary_union(shapes).area == pytest.approx(sum(shape.area for shape in shapes), rel=1e-6, abs=0)
 
 
 def test_elements_next_to_a_via_follow_the_strips_bend_beyond_it() -> None:

@@ -40,7 +40,7 @@ def test_volume_is_the_integral_over_the_half_section(
     magnet: Geometry, rho_from: float, rho_to: float, length: float
 ) -> None:
     integral, _ = dblquad(lambda rho, z: 2 * pi * rho, -length / 2, length / 2, rho_from, rho_to)
-    assert magnet.volume == pytest.approx(integral, rel=1e-12)
+    assert magnet.volume == pytest.approx(integral, rel=1e-12, abs=0)
 
 
 @pytest.mark.parametrize(("magnet", "rho_from", "rho_to", "length"), HALF_SECTIONS)
@@ -48,7 +48,7 @@ def test_area_follows_from_pappus(magnet: Geometry, rho_from: float, rho_to: flo
     # Each side of the half section turned about the axis: its length times the way of its centroid.
     walls = 2 * pi * (rho_from + rho_to) * length
     faces = 2 * 2 * pi * (rho_from + rho_to) / 2 * (rho_to - rho_from)
-    assert magnet.area == pytest.approx(walls + faces, rel=1e-12)
+    assert magnet.area == pytest.approx(walls + faces, rel=1e-12, abs=0)
 
 
 def test_moment_of_the_catalogue_ring_by_hand() -> None:
@@ -95,9 +95,9 @@ def test_default_region_follows_the_size() -> None:
 def test_solid_has_the_closed_volume_and_area(magnet: Geometry, occ: Any) -> None:
     (tag,) = magnet.build(occ)["magnet"]
     occ.synchronize()
-    assert occ.getMass(3, tag) == pytest.approx(magnet.volume, rel=1e-9)
+    assert occ.getMass(3, tag) == pytest.approx(magnet.volume, rel=1e-9, abs=0)
     _, faces = occ.getSurfaceLoops(tag)
-    assert sum(occ.getMass(2, face) for face in np.concatenate(faces)) == pytest.approx(magnet.area, rel=1e-9)
+    assert sum(occ.getMass(2, face) for face in np.concatenate(faces)) == pytest.approx(magnet.area, rel=1e-9, abs=0)
     np.testing.assert_allclose(occ.getCenterOfMass(3, tag), 0, atol=1e-9)
 
 
@@ -113,7 +113,7 @@ def test_solid_fills_its_hull(magnet: RingMagnet | CylinderMagnet, occ: Any) -> 
 def test_half_section_turned_about_the_axis_is_the_solid(magnet: Geometry, occ: Any) -> None:
     (tag,) = magnet.build_meridian(occ)["magnet"]
     rho, z, off_plane = occ.getCenterOfMass(2, tag)
-    assert 2 * pi * rho * occ.getMass(2, tag) == pytest.approx(magnet.volume, rel=1e-9)  # Pappus
+    assert 2 * pi * rho * occ.getMass(2, tag) == pytest.approx(magnet.volume, rel=1e-9, abs=0)  # Pappus
     assert (z, off_plane) == pytest.approx((0, 0), abs=1e-12)
 
 

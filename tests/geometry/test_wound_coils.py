@@ -110,13 +110,13 @@ def test_cards_of_the_catalogue_come_back(name: str, kind: type) -> None:
 def test_metal_of_the_coaxial_coils() -> None:
     """By Pappus: the wire's sections times the way of their middle; or the window's ring times the fill."""
     fine = coil("solenoid_24x48x60")
-    assert fine.volume == pytest.approx(1000 * np.pi * 36e-3 * np.pi / 4 * 0.75e-3**2, rel=1e-14)
+    assert fine.volume == pytest.approx(1000 * np.pi * 36e-3 * np.pi / 4 * 0.75e-3**2, rel=1e-14, abs=0)
     filled = coil("solenoid_20x30x30")
-    assert filled.volume == pytest.approx(0.6 * np.pi * (15e-3**2 - 10e-3**2) * 30e-3, rel=1e-14)
+    assert filled.volume == pytest.approx(0.6 * np.pi * (15e-3**2 - 10e-3**2) * 30e-3, rel=1e-14, abs=0)
     loop = coil("loop_50")
-    assert loop.volume == pytest.approx(2 * np.pi**2 * 25e-3 * 0.5e-3**2, rel=1e-14)  # a torus
+    assert loop.volume == pytest.approx(2 * np.pi**2 * 25e-3 * 0.5e-3**2, rel=1e-14, abs=0)  # a torus
     pair = coil("helmholtz_pair_200")
-    assert pair.volume == pytest.approx(240 * 0.2 * np.pi * np.pi / 4 * 0.9e-3**2, rel=1e-14)
+    assert pair.volume == pytest.approx(240 * 0.2 * np.pi * np.pi / 4 * 0.9e-3**2, rel=1e-14, abs=0)
 
 
 def test_helmholtz_pair_stands_a_mean_radius_apart() -> None:
@@ -208,7 +208,7 @@ def test_racetrack_with_a_long_side_converges_to_two_wires() -> None:
 def test_saddle_field_points_along_x() -> None:
     first, second = (centre_field(part.layers(1.0)) for part in swept("saddle_coil_pair_40x60"))
     assert first[0] > 0
-    assert second[0] == pytest.approx(first[0], rel=1e-12)
+    assert second[0] == pytest.approx(first[0], rel=1e-12, abs=0)
     assert first + second == pytest.approx([2 * first[0], 0, 0], abs=1e-12)
 
 

@@ -74,7 +74,7 @@ def test_homogeneous_volume_of_an_even_gradient_is_its_ellipsoid() -> None:
 
 def test_homogeneous_volume_ends_where_the_search_does() -> None:
     field = Linear(np.array([1e-3, 0.0, 0.0]), np.zeros((3, 3)))
-    assert homogeneous_volume(field, np.ones(3), 2e-3) == pytest.approx(4 * np.pi / 3 * 8e-9, rel=1e-12)
+    assert homogeneous_volume(field, np.ones(3), 2e-3) == pytest.approx(4 * np.pi / 3 * 8e-9, rel=1e-12, abs=0)
 
 
 def test_deviation_is_relative_to_the_centre_and_infinite_without_a_field_there() -> None:

@@ -108,7 +108,7 @@ def read(path: Path, text: str, columns: dict[str, str] | None = None) -> Sample
 def test_a_spreadsheet(file: Path, caplog: pytest.LogCaptureFixture) -> None:
     with caplog.at_level(logging.INFO, "magfem"):
         samples = read(file, SPREADSHEET)
-    assert samples.points == pytest.approx(np.array([[-1.5e-3, 0, 2e-3], [1.5e-3, 0, 2e-3]]), rel=1e-15)
+    assert samples.points == pytest.approx(np.array([[-1.5e-3, 0, 2e-3], [1.5e-3, 0, 2e-3]]), rel=1e-15, abs=0)
     expected = np.array([[1e-3, -2.5e-4, 12.5e-3], [-1e-3, 2.5e-4, 12.5e-3]])
     assert np.allclose(samples.B, expected, rtol=1e-15, atol=0)
     assert (samples.unit, samples.source) == ("T", "export.txt")
@@ -117,8 +117,8 @@ def test_a_spreadsheet(file: Path, caplog: pytest.LogCaptureFixture) -> None:
 
 def test_a_spreadsheet_with_commas_and_other_expressions(file: Path) -> None:
     samples = read(file, COMMA)
-    assert samples.points[0] == pytest.approx([1e-6, 2e-6, 3e-6], rel=1e-15)
-    assert samples.B[0] == pytest.approx([4e-6, 5e-6, 6e-6], rel=1e-15)
+    assert samples.points[0] == pytest.approx([1e-6, 2e-6, 3e-6], rel=1e-15, abs=0)
+    assert samples.B[0] == pytest.approx([4e-6, 5e-6, 6e-6], rel=1e-15, abs=0)
 
 
 def test_names_too_long_for_their_columns(file: Path) -> None:

@@ -58,8 +58,8 @@ def refusal(path: Path, text: str | bytes, columns: dict[str, str] | None = None
 def test_headers_and_units(name: str, file: Path) -> None:
     header, row = HEADERS[name]
     samples = read(file, f"{header}\n{row}\n")
-    assert samples.points[0] == pytest.approx(ROW[0], rel=1e-15)
-    assert samples.B[0] == pytest.approx(ROW[1], rel=1e-15)
+    assert samples.points[0] == pytest.approx(ROW[0], rel=1e-15, abs=0)
+    assert samples.B[0] == pytest.approx(ROW[1], rel=1e-15, abs=0)
     assert (samples.unit, samples.sigma, samples.source) == ("T", None, "s.csv")
 
 
@@ -120,8 +120,8 @@ def test_columns_by_other_names(file: Path) -> None:
     text = "stage_x_mm,stage_y,depth [um],raw,Bx_mT\n1,2,3,4,5\n"
     columns = {"x": "-stage_x_mm", "y": "stage_y [cm]", "z": "depth [um]", "Bz": "- raw [uT]", "by": "raw [mT]"}
     samples = read(file, text, columns)
-    assert samples.points[0] == pytest.approx([-1e-3, 2e-2, 3e-6], rel=1e-15)
-    assert samples.B[0] == pytest.approx([5e-3, 4e-3, -4e-6], rel=1e-15)
+    assert samples.points[0] == pytest.approx([-1e-3, 2e-2, 3e-6], rel=1e-15, abs=0)
+    assert samples.B[0] == pytest.approx([5e-3, 4e-3, -4e-6], rel=1e-15, abs=0)
     swapped = read(file, "x,y,z,Bx,By,Bz\n1,2,3,4,5,6\n", {"x": "y", "y": "-x", "Bx": "By", "By": "-Bx"})
     assert swapped.points.tolist() == [[2, -1, 3]] and swapped.B.tolist() == [[5, -4, 6]]
 
