@@ -26,8 +26,9 @@ class Chain:
     flexible, length, stiffness, rest: of links, as `chain_kernel.shape` takes them.  section: (e,) which section a link
     is of.  arc_length: (e + 1,) m.  weight: (e + 1,) kg carried by a node.  end_weight: (e + 1, 3) kg·m in the node's
     axes, of the couples (R end_weight) × g that complete the trapezoid rule for a section's weight.  force, couple:
-    (e + 1, 3) N and (e + 1, 3, 3) N·m, world by node's axes, the same of forces per length.  torque: (e + 1, 3) N·m of moments per length.  dipole_node, dipole_offset, dipole_moment: (d,), (d, 3),
-    (d, 3) in the node's axes.  dipole_magnet: (d,), the magnet it is of, or −1.  magnet_node: (m,) at their centres.
+    (e + 1, 3) N and (e + 1, 3, 3) N·m, world by node's axes, the same of forces per length.  torque: (e + 1, 3) N·m of
+    moments per length.  dipole_node, dipole_offset, dipole_moment: (d,), (d, 3), (d, 3) in the node's axes.
+    dipole_magnet: (d,), the magnet it is of, or −1.  magnet_node: (m,) at their centres.
     """
 
     flexible: Booleans

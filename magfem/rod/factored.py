@@ -13,10 +13,13 @@ from magfem.rod.chain import Chain
 from magfem.rod.loads import Acting
 from magfem.typing import Floats, Integers, Points
 
+NEUTRAL = 1e-7
+"""Eigenvalues of less, in units of the elastic Hessian, are those of a turn that no load resists."""
+
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """Twists (e, 12) and the poses that follow: R (e + 1, 3, 3), p (e + 1, 3) m of the nodes, and between two screws."""
+    """Twists (e, 12) and the poses that follow: R (e + 1, 3, 3), p (e + 1, 3) m of the nodes, and of links' middles."""
 
     twist: Floats
     R: Floats
@@ -161,6 +164,13 @@ class Factored:
         C, W = 0.5 * (C + C.T) / np.outer(scale, scale), 0.5 * (W + W.T) * np.outer(scale, scale)
         small = np.block([[-C, -np.eye(size)], [-np.eye(size), W]])
         return self.chain_negative + int(np.count_nonzero(np.linalg.eigvalsh(small) < -chain_kernel.NEUTRAL)) - size
+
+    @cached_property
+    def unstable_directions(self) -> int:
+        """Eigenvalues below −`NEUTRAL` of the Hessian without damping, in units of the elastic one."""
+        if not self.negative:
+            return 0
+        return factored(self.chain, self.shape, self.acting, self.coupled, NEUTRAL).negative
 
 
 def factored(chain: Chain, shape: Shape, acting: Acting, coupled: Integers, damping: float = 0.0) -> Factored:

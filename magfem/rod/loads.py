@@ -20,8 +20,8 @@ _ZERO = np.zeros(3)
 class Acting:
     """What the loads do at one shape.
 
-    energy: J, of what has a potential.  wrench: (e + 1, 6) torque, force.  tangent: (e + 1, 6, 6), the symmetric part of
-    −∂wrench/∂x, x = (ω, v).  remainder: (k, k) of the coordinates `Loads.coupled`, what the tangents lack; None when
+    energy: J, of what has a potential.  wrench: (e + 1, 6) torque, force.  tangent: (e + 1, 6, 6), the symmetric part
+    of −∂wrench/∂x, x = (ω, v).  remainder: (k, k) of the coordinates `Loads.coupled`, what the tangents lack; None when
     there are none.  points: (d, 3) m of the dipoles.  jets: the field there.
     """
 

@@ -16,7 +16,7 @@ Curvature: TypeAlias = ArrayLike | Callable[[Floats], Floats]
 """(3,) 1/m, or a function of arc length (n,) m from the section's start that gives (n, 3)."""
 
 ELEMENTS, TORQUE_ELEMENTS, MAGNETIC_ELEMENTS = 16, 64, 256
-"""Of a flexible section, by default; of one with moments per length, and of a hard-magnetic one: these act at the nodes."""
+"""Of a flexible section, by default; of one with moments per length and of a hard-magnetic one, which act at nodes."""
 
 
 @dataclass(frozen=True)
@@ -66,12 +66,13 @@ class FlexibleSection:
     """A stretch of elastic rod.
 
     length: m.  radius: m of its full circle, or of the tube's outside with `inner_radius`; or any `cross_section`.
-    youngs_modulus: Pa.  poisson_ratio: for G = E / 2(1 + ν), or `shear_modulus` Pa itself.  density: kg/m³, for gravity.
-    intrinsic_curvature: (3,) 1/m without load, in the section's axes, or a function of arc length; its third component
-    is twist.  intrinsic_strain: (3,), dp/ds in the section's axes without load.  force_per_length: (3,) N/m and
-    moment_per_length: (3,) N, in world axes, whatever the shape.  magnetic_moment_per_length: (3,) A·m in the section's
-    axes, of a hard-magnetic section.  elements: how many it is divided into (default 16, with moments per length 64, hard-magnetic 256); the
-    shape's error falls with their fourth power, that of torques along the section with their square.
+    youngs_modulus: Pa.  poisson_ratio: for G = E / 2(1 + ν), or `shear_modulus` Pa itself.  density: kg/m³, of its
+    weight.  intrinsic_curvature: (3,) 1/m without load, in the section's axes, or a function of arc length; its third
+    component is twist.  intrinsic_strain: (3,), dp/ds in the section's axes without load.  force_per_length: (3,) N/m
+    and moment_per_length: (3,) N, in world axes, whatever the shape.  magnetic_moment_per_length: (3,) A·m in the
+    section's axes, of a hard-magnetic section.  elements: how many it is divided into (default 16, with moments per
+    length 64, hard-magnetic 256); the shape's error falls with their fourth power, that of torques along the section
+    with their square.
     Source of the constitutive law: dissertation, eq. 2.2; K = diag(EI_x, EI_y, GJ), diag(GA, GA, EA).
     """
 

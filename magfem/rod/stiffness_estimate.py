@@ -32,7 +32,9 @@ class StiffnessEstimate:
         return exp(self.log_factor)
 
 
-def updated(before: StiffnessEstimate, model: RodState, in_use: float, positions: Points, axes: Floats) -> StiffnessEstimate:
+def updated(
+    before: StiffnessEstimate, model: RodState, in_use: float, positions: Points, axes: Floats
+) -> StiffnessEstimate:
     """The estimate after magnets were seen at `positions` (m, 3) m, the rod's axis along `axes` (m, 3) there.
 
     model: the state of the rod whose moduli are `in_use` times the nominal ones. One Gauss–Newton step of the factor

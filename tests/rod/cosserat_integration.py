@@ -38,8 +38,8 @@ def stiffness(one: FlexibleSection):
     """K_b, K_s of a full circle."""
     E, r = one.youngs_modulus, one.radius
     G = one.shear_modulus if one.shear_modulus is not None else E / (2 * (1 + one.poisson_ratio))
-    I, A = np.pi * r**4 / 4, np.pi * r**2
-    return np.array([E * I, E * I, G * 2 * I]), np.array([G * A, G * A, E * A])
+    second, A = np.pi * r**4 / 4, np.pi * r**2
+    return np.array([E * second, E * second, G * 2 * second]), np.array([G * A, G * A, E * A])
 
 
 def integrate(problem: Problem, n, m):

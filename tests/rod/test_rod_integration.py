@@ -48,7 +48,8 @@ FIELDS = {
     "uniform": UniformField([0.004, 0.010, 0.012]),
     "against the magnets": UniformField([-0.012, 0.004, 0.002]),
     "a dipole's": NEAR_DIPOLE,
-    "fitted": 8.0 * magfem.load_model("bigmag_iron").at(
+    "fitted": 8.0
+    * magfem.load_model("bigmag_iron").at(
         RigidTransform.from_components([0.01, -0.085, 0.03], Rotation.from_euler("x", -70, degrees=True))
     ),
 }
