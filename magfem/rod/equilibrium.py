@@ -84,6 +84,8 @@ def find_equilibrium(
     damping, iterations, escapes, blocked = 0.0, 0, 0, 0
     while True:
         system = factored(chain, here.shape, here.acting, loads.coupled, damping)
+        if not np.isfinite(system.residual):
+            return Equilibrium(system, iterations, "stalled")
         if system.residual <= tolerance:
             if damping:
                 system = factored(chain, here.shape, here.acting, loads.coupled)
@@ -227,6 +229,8 @@ def relax(
     while True:
         shape = shape_of(chain, twist, R_base, p_base)
         system = factored(chain, shape, loads.act(shape.R, shape.p), loads.coupled, damping)
+        if not np.isfinite(system.residual):
+            return Equilibrium(system, iterations, "stalled")
         if system.residual <= tolerance:
             system = factored(chain, shape, system.acting, loads.coupled)
             return Equilibrium(system, iterations, "unstable" if system.unstable_directions else "stable")

@@ -30,8 +30,7 @@ class CrossSection:
 
     def __post_init__(self) -> None:
         for name in ("area", "second_moment_x", "second_moment_y", "torsion_constant"):
-            if not 0 < getattr(self, name) < np.inf:
-                raise InputError(f"cross-section: {name} must be positive and finite, got {getattr(self, name)!r}")
+            positive("cross-section", name, getattr(self, name))
 
     @classmethod
     def disc(cls, radius: float) -> CrossSection:
@@ -41,7 +40,7 @@ class CrossSection:
     @classmethod
     def tube(cls, inner_radius: float, outer_radius: float) -> CrossSection:
         """A circular ring, radii in m."""
-        if not (0 <= inner_radius < outer_radius < np.inf):
+        if not (is_number(inner_radius) and is_number(outer_radius) and 0 <= inner_radius < outer_radius):
             raise InputError(
                 f"cross-section: a tube needs 0 ≤ inner radius < outer radius, got {inner_radius!r} and "
                 f"{outer_radius!r} m"
@@ -52,7 +51,7 @@ class CrossSection:
     @classmethod
     def rectangle(cls, width: float, height: float) -> CrossSection:
         """Sides in m along x and y; the torsion constant by Saint-Venant's series (Timoshenko & Goodier, § 109)."""
-        if not (0 < width < np.inf and 0 < height < np.inf):
+        if not (is_number(width) and is_number(height) and width > 0 and height > 0):
             raise InputError(f"cross-section: a rectangle needs two positive sides, got {width!r} and {height!r} m")
         a, b = max(width, height), min(width, height)
         odd = np.arange(1, 200, 2)
@@ -94,9 +93,8 @@ class FlexibleSection:
     def __post_init__(self) -> None:
         positive("flexible section", "length", self.length)
         positive("flexible section", "youngs_modulus", self.youngs_modulus)
-        if not (isfinite(self.density) and self.density >= 0):
-            raise InputError(f"flexible section: density must not be negative (kg/m³), got {self.density!r}")
-        if not -1 < self.poisson_ratio <= 0.5:
+        not_negative("flexible section", "density", "kg/m³", self.density)
+        if not (is_number(self.poisson_ratio) and -1 < self.poisson_ratio <= 0.5):
             raise InputError(
                 f"flexible section: poisson_ratio must lie above -1 and up to 0.5, got {self.poisson_ratio!r}"
             )
@@ -104,6 +102,10 @@ class FlexibleSection:
             positive("flexible section", "shear_modulus", self.shear_modulus)
         if (self.radius is None) == (self.cross_section is None):
             raise InputError("flexible section: state either radius (m) or cross_section")
+        if not isinstance(self.cross_section, CrossSection | None):
+            raise InputError(
+                f"flexible section: cross_section is a CrossSection, got {type(self.cross_section).__name__}"
+            )
         if self.elements is not None and not (type(self.elements) is int and 2 <= self.elements <= 4096):
             raise InputError(f"flexible section: elements must be a whole number from 2 to 4096, got {self.elements!r}")
         _ = self.section
@@ -155,10 +157,8 @@ class MagnetSection:
     field_points: int = 1
 
     def __post_init__(self) -> None:
-        if not (isfinite(self.length) and self.length >= 0):
-            raise InputError(f"magnet section: length must not be negative (m), got {self.length!r}")
-        if not (isfinite(self.mass) and self.mass >= 0):
-            raise InputError(f"magnet section: mass must not be negative (kg), got {self.mass!r}")
+        not_negative("magnet section", "length", "m", self.length)
+        not_negative("magnet section", "mass", "kg", self.mass)
         if type(self.field_points) is not int or not 1 <= self.field_points <= 16:
             raise InputError(
                 f"magnet section: field_points must be a whole number from 1 to 16, got {self.field_points!r}"
@@ -168,15 +168,26 @@ class MagnetSection:
     @property
     def moment_vector(self) -> Floats:
         """(3,) A·m² in the magnet's axes."""
-        if isinstance(self.moment, int | float):
-            return three("magnet section", "moment", (0.0, 0.0, self.moment))
+        if is_number(self.moment) or (isinstance(self.moment, np.ndarray) and self.moment.ndim == 0):
+            return three("magnet section", "moment", (0.0, 0.0, float(self.moment)))  # type: ignore[arg-type]
         return three("magnet section", "moment", self.moment)
 
 
 def positive(what: str, name: str, value: float) -> None:
     """Raise InputError unless `value` is positive and finite."""
-    if not (isinstance(value, int | float | np.floating | np.integer) and 0 < value < np.inf):
+    if not (is_number(value) and value > 0):
         raise InputError(f"{what}: {name} must be positive and finite, got {value!r}")
+
+
+def not_negative(what: str, name: str, unit: str, value: float) -> None:
+    """Raise InputError unless `value` is finite and not negative."""
+    if not (is_number(value) and value >= 0):
+        raise InputError(f"{what}: {name} must be finite and not negative ({unit}), got {value!r}")
+
+
+def is_number(value: object) -> bool:
+    """Whether `value` is one finite real number."""
+    return isinstance(value, int | float | np.floating | np.integer) and isfinite(value)
 
 
 def three(what: str, name: str, value: ArrayLike) -> Floats:

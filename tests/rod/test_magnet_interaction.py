@@ -27,7 +27,7 @@ def dipoles(moments, places, turns=None):
 
 @pytest.mark.parametrize("one,other", [(0.02, 0.03), (0.02, -0.03)])
 def test_two_dipoles_in_line_and_side_by_side(one, other):
-    """F = 3µ₀m₁m₂/2πr⁴ in line, attraction of equal signs; −3µ₀m₁m₂/4πr⁴ side by side; energies −µ₀m₁m₂/2πr³, +/4πr³."""
+    """Forces 3µ₀m₁m₂/2πr⁴ in line and −3µ₀m₁m₂/4πr⁴ side by side; energies −µ₀m₁m₂/2πr³ and µ₀m₁m₂/4πr³."""
     r = 0.04
     energy, wrench, _ = dipoles([[0, 0, one], [0, 0, other]], [[0, 0, 0], [0, 0, r]])
     force = 3 * MU_0 * one * other / (2 * np.pi * r**4)

@@ -77,7 +77,10 @@ def loads_of(name, chain, rod):
         "field": dict(applied=applied_field(100 * FIELD)),
         "among themselves": dict(interaction=interaction_of([None, None], 20 * moments)),
         "all": dict(
-            applied=applied_field(100 * FIELD), gravity=GRAVITY, interaction=interaction_of([None, FIELD], moments), **tip
+            applied=applied_field(100 * FIELD),
+            gravity=GRAVITY,
+            interaction=interaction_of([None, FIELD], moments),
+            **tip,
         ),
         "dead moment": dict(tip_moment=np.array([4e-4, -3e-4, 5e-4]), **tip),
         "follower": dict(tip_moment=np.array([4e-4, -3e-4, 5e-4]), follower=True, **tip),
