@@ -25,8 +25,8 @@ from magfem.fields.terms import Terms
 from magfem.fields.workspace_region import Ball, Box
 from magfem.files import write_text
 from magfem.fitting.about import facts
-from magfem.typing import Floats
-from magfem.units import one_line
+from magfem.typing import ArrayLike, Floats
+from magfem.units import format_quantity, one_line
 
 log = logging.getLogger("magfem")
 
@@ -59,6 +59,7 @@ def write_mpem(
     workspace: Region | None = None,
     tolerance: float = TOLERANCE,
     strict: bool = True,
+    joints: ArrayLike | None = None,
 ) -> MpemExport:
     """Write a coil system, or one coil's model, as an MPEM calibration file.
 
@@ -66,10 +67,21 @@ def write_mpem(
     coils.  workspace: a Ball or Box where the file is to hold; by default the system's workspace or the model's
     region. `Workspace_Dimensions` are the box, the cube within the ball, or the box around a shell about a body.
     tolerance: of the fit, if one is needed, relative.  strict: whether a larger residual is refused
-    (ConvergenceError) or written all the same.
+    (ConvergenceError) or written all the same.  joints: (j,) rad or m, of a system whose coils move: the file holds
+    there alone, and its first lines say so.
 
     Raises InputError for a field without terms, and where no workspace is known.
     """
+    header = []
+    if isinstance(source, CoilSystem):
+        values, moving = source.checked_joints(joints).tolist(), source.joints
+        if moving:
+            stated = zip(moving, values, strict=True)
+            places = [f"{one.name} = {format_quantity(value, one.dimension)}" for one, value in stated]
+            header = [f"With the joints at {', '.join(places)}."]
+        source = source.fixed(joints)
+    elif joints is not None:
+        raise InputError("joints are those of a coil system, and this is one field")
     name, parts, region = _parts(source)
     region = workspace or region
     box = _workspace_box(region)
@@ -84,9 +96,9 @@ def write_mpem(
             f"{tolerance:.2g}: choose a smaller workspace or a larger tolerance"
         )
     file = Path(path)
-    header = [f"{name}, written by magfem.", f"Per ampere, in T/A; {outcome}; region: {region.describe()}."]
+    lines = [f"{name}, written by magfem.", f"Per ampere, in T/A; {outcome}; region: {region.describe()}.", *header]
     written = {label: axial_multipoles(fit.terms) for label, fit in fits.items()}
-    write_text(file, _text(name, written, box, header))
+    write_text(file, _text(name, written, box, lines))
     count = sum(map(len, written.values()))
     log.info("mpem: %d sources, %s", count, outcome)
     residuals = {label: (fit.maximum, fit.rms) for label, fit in fits.items()}

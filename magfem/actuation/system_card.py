@@ -15,6 +15,15 @@
     position = ["-40 mm", "0 mm", "0 mm"]               # of the model's origin
     rotation = [{ z = "180 deg" }, { y = "90 deg" }]    # intrinsic, in this order; or quaternion, or direction
     current_limit = "8 A"
+    joint = "turntable"              # what carries it; its pose is then the one at joint values zero
+
+    [[joints]]                       # in the order of the joint values
+    name = "turntable"
+    kind = "revolute"                # or "prismatic", whose limits are lengths and which has no point
+    axis = [0, 0, 1]
+    point = ["0 mm", "0 mm", "0 mm"]        # of the axis, at joint values zero
+    limits = ["-90 deg", "90 deg"]
+    parent = "gantry"                # optional: the joint that carries this one
 
 Instead of `[[coils]]`, `calibration` names an MPEM file beside the card.
 """
@@ -28,6 +37,7 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from magfem.actuation.coil_system import CoilSystem, SystemCoil
+from magfem.actuation.joints import KINDS, Joint, Joints
 from magfem.actuation.mpem import read_mpem
 from magfem.errors import CardError, InputError
 from magfem.fields.region import Everywhere, Region
@@ -48,15 +58,16 @@ _TURNS = ("rotation", "quaternion", "direction")
 def read_system_card(file: Path, shown: str) -> CoilSystem:
     """The coil system of a card; `shown` is how messages name the file. Raises CardError."""
     card = read_table(file, shown)
-    card.only("kind", "name", "source", "current_limit", "workspace", "coils", "calibration")
+    card.only("kind", "name", "source", "current_limit", "workspace", "coils", "calibration", "joints")
     if (kind := card.text("kind")) != KIND:
         raise card.error(f'a system card is of kind "{KIND}", got {describe(kind)}', "kind")
     name, source = card.text("name"), card.text("source") if "source" in card else ""
     workspace = _workspace(card.table("workspace")) if "workspace" in card else None
     limit = _limit(card)
     if "calibration" in card:
-        if "coils" in card:
-            raise card.error("a system has either a calibration or coils, not both", "calibration")
+        for key in ("coils", "joints"):
+            if key in card:
+                raise card.error(f"a system has either a calibration or {key}, not both", "calibration")
         file_name = card.text("calibration")
         calibrated = read_mpem(file.parent / file_name, _beside(shown, file_name))
         return replace(
@@ -69,18 +80,50 @@ def read_system_card(file: Path, shown: str) -> CoilSystem:
     coils = tuple(_coil(entry, file.parent, limit) for entry in card.tables("coils"))
     if not coils:
         raise card.error("coils must be one or more tables [[coils]]", "coils")
+    joints = tuple(_joint(entry) for entry in card.tables("joints")) if "joints" in card else ()
     try:
-        return CoilSystem(name, coils, workspace=workspace or Everywhere(), source=source)
+        Joints(joints)
+    except InputError as error:
+        raise card.error(str(error), "joints") from None
+    try:
+        return CoilSystem(name, coils, workspace=workspace or Everywhere(), source=source, joints=joints)
     except InputError as error:
         raise card.error(str(error), "coils") from None
 
 
 def _coil(entry: Table, folder: Path, limit: float | None) -> SystemCoil:
-    entry.only("name", "model", "position", "current_limit", *_TURNS)
+    entry.only("name", "model", "position", "current_limit", "joint", *_TURNS)
     terms, region = _model(entry, folder)
     position = np.array(three_lengths(entry, "position")) if "position" in entry else np.zeros(3)
     pose = RigidTransform.from_components(position, _turn(entry, terms))
-    return SystemCoil(entry.text("name"), terms, region, pose, _limit(entry) or limit)
+    joint = entry.text("joint") if "joint" in entry else None
+    return SystemCoil(entry.text("name"), terms, region, pose, _limit(entry) or limit, joint)
+
+
+def _joint(entry: Table) -> Joint:
+    """One of the tables [[joints]]."""
+    entry.only("name", "kind", "axis", "point", "limits", "parent")
+    name, kind = entry.text("name"), entry.text("kind")
+    if kind not in KINDS:
+        raise entry.error(f"kind must be revolute or prismatic, got {describe(kind)}", "kind")
+    revolute = kind == "revolute"
+    if not revolute and "point" in entry:
+        raise entry.error("a prismatic joint slides along its axis wherever that lies: leave the point out", "point")
+    axis = three_numbers(entry, "axis")
+    point = three_lengths(entry, "point") if "point" in entry else (0.0, 0.0, 0.0)
+    parent = entry.text("parent") if "parent" in entry else None
+    stated = entry.value("limits")
+    example = '["-90 deg", "90 deg"]' if revolute else '["-20 mm", "20 mm"]'
+    if not isinstance(stated, list) or len(stated) != 2:
+        raise entry.error(f"limits must be two values such as {example}, got {describe(stated)}", "limits")
+    try:
+        low, high = (quantity(one, "angle" if revolute else "length") for one in stated)
+    except InputError as error:
+        raise entry.error(f"limits: {error}", "limits") from None
+    try:
+        return Joint(name, "revolute" if revolute else "prismatic", axis, (low, high), point, parent)
+    except InputError as error:
+        raise entry.error(str(error), "axis" if "axis" in str(error) else "limits") from None
 
 
 def _model(entry: Table, folder: Path) -> tuple[Terms, Region]:

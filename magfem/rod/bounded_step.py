@@ -11,8 +11,11 @@ from magfem.typing import Booleans, Floats
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """change: (n,) of the parameters.  clamped: (n,) which ended at a bound.  rank: directions of the goal that the free
-    parameters reach.  condition: largest over smallest singular value, of all parameters."""
+    """What was found.
+
+    change: (n,) of the parameters.  clamped: (n,) which ended at a bound.  rank: directions of the goal that the free
+    parameters reach.  condition: largest over smallest singular value, of all parameters.
+    """
 
     change: Floats
     clamped: Booleans

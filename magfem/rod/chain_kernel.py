@@ -491,7 +491,11 @@ def solve(
     base: (6, n) how the base moves.
     """
     links, n = flexible.size, node_load.shape[2]
-    l = -node_load[links]  # noqa: E741
+    l = np.empty((6, n))  # noqa: E741
+    for i in range(6):
+        for q in range(n):
+            l[i, q] = -node_load[links, i, q]
+            x[0, i, q] = base[i, q]
     for k in range(links - 1, -1, -1):
         d0, d1, d2 = p[k + 1, 0] - p[k, 0], p[k + 1, 1] - p[k, 1], p[k + 1, 2] - p[k, 2]
         if flexible[k]:
@@ -516,7 +520,6 @@ def solve(
                         l[i, q] += f * out[j, q]
             for q in range(n):
                 l[i, q] -= node_load[k, i, q]
-    x[0] = base
     for k in range(links):
         d0, d1, d2 = p[k + 1, 0] - p[k, 0], p[k + 1, 1] - p[k, 1], p[k + 1, 2] - p[k, 2]
         here, there = x[k], x[k + 1]
@@ -555,7 +558,10 @@ def solve_one(
 ) -> None:
     """As `solve` for one load and a base that stands still: arrays without their last axis."""
     links = flexible.size
-    l = -node_load[links]  # noqa: E741
+    l = np.empty(6)  # noqa: E741
+    for i in range(6):
+        l[i] = -node_load[links, i]
+        x[0, i] = 0.0
     for k in range(links - 1, -1, -1):
         if flexible[k]:
             Bk, L, out = B[k], pivots[k], twist[k]
@@ -580,7 +586,6 @@ def solve_one(
                 for j in range(12):
                     l[i] += mixed[k, i, j] * twist[k, j]
             l[i] -= node_load[k, i]
-    x[0] = 0.0
     for k in range(links):
         d0, d1, d2 = p[k + 1, 0] - p[k, 0], p[k + 1, 1] - p[k, 1], p[k + 1, 2] - p[k, 2]
         here, there = x[k], x[k + 1]

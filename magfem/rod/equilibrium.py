@@ -70,7 +70,7 @@ def find_equilibrium(
     """For loads with a potential, the equilibrium that descending from the twists `start` (e, 12) leads to.
 
     R_base (3, 3), p_base (3,) m: the base's pose.  leave_saddles: go on from an unstable equilibrium to a stable one.
-    allowed: whether the dipoles may be at points (d, 3) m; they do not leave that, unless they start outside.
+    allowed: whether the dipoles may be at points (d, 3) m; they do not leave what is allowed, unless they start beyond.
     """
 
     def at(twist: Floats) -> _Point:
@@ -259,9 +259,3 @@ def predicted(before: Factored, loads: Loads) -> tuple[Floats, float]:
     step, moved = before.step(node_load=change)
     turn = float(np.abs(moved[:, :3]).max())
     return (shape.twist + step if turn < _LARGEST_PREDICTED else shape.twist), turn
-
-
-def largest_turn(before: Floats, after: Floats) -> float:
-    """rad, the most that any of the frames (n, 3, 3) has turned."""
-    least = float(np.einsum("nij,nij->n", before, after).min())
-    return float(np.arccos(np.clip((least - 1) / 2, -1.0, 1.0)))

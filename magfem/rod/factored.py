@@ -19,7 +19,7 @@ NEUTRAL = 1e-7
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """Twists (e, 12) and the poses that follow: R (e + 1, 3, 3), p (e + 1, 3) m of the nodes, and of links' middles."""
+    """Twists (e, 12), and the poses that follow: R (e + 1, 3, 3), p (e + 1, 3) m of nodes, and between two screws."""
 
     twist: Floats
     R: Floats

@@ -67,8 +67,8 @@ class GoalError:
 def goal_error(goals: Sequence[Goal], positions: Points, frames: Floats) -> GoalError:
     """How far magnets at `positions` (m, 3) with `frames` (m, 3, 3) are from the goals.
 
-    Directions: the azimuthal equidistant map about the wanted one, (θ / sin θ) (t₁·a, t₂·a), whose length is the angle θ
-    itself; it has no arc cosine, whose slope is infinite at the goal. Rotations: the logarithm of R Rᵀ_wanted.
+    Directions: the azimuthal equidistant map about the wanted one, (θ / sin θ) (t₁·a, t₂·a), whose length is the angle
+    θ itself; it has no arc cosine, whose slope is infinite at the goal. Rotations: the logarithm of R Rᵀ_wanted.
     """
     count = len(positions)
     rows, slopes, angles, distances = [], [], [], []
@@ -110,10 +110,10 @@ def _slope(count: int, magnet: int, shift: Floats | None = None, turn: Floats | 
 def _direction_error(wanted: Floats, axis: Floats) -> tuple[Floats, Floats]:
     """(2,) and its derivative (2, 3) by a turn of `axis`."""
     d = wanted / np.linalg.norm(wanted)
-    first = np.eye(3)[np.argmin(np.abs(d))]
-    t1 = np.cross(d, first)
-    t1 /= np.linalg.norm(t1)
-    T = np.stack([t1, np.cross(d, t1)])
+    D = _cross(d)
+    t1 = D[:, np.argmin(np.abs(d))]  # d × the axis that is farthest from it
+    t1 = t1 / np.linalg.norm(t1)
+    T = np.stack([t1, D @ t1])
     flat = T @ axis
     cosine, sine = float(d @ axis), float(np.linalg.norm(flat))
     theta = float(np.arctan2(sine, cosine))
@@ -137,7 +137,8 @@ def _inverse_left_jacobian(e: Floats) -> Floats:
     if theta < 1e-4:
         return np.eye(3) - 0.5 * E + E @ E / 12
     half = theta / 2
-    return np.eye(3) - 0.5 * E + (1 - half / np.tan(half)) / theta**2 * E @ E
+    inverse: Floats = np.eye(3) - 0.5 * E + (1 - half / np.tan(half)) / theta**2 * E @ E
+    return inverse
 
 
 def _cross(a: Floats) -> Floats:

@@ -125,7 +125,7 @@ def node_loads(
 def field_loads(
     node: Integers, offset: Floats, moment: Floats, R: Floats, dB: Floats, dG: Floats, load: Floats
 ) -> None:
-    """Add to load (n, 6, k) torque, force on the nodes by k changes of the field, dB (k, m, 3), dG (k, m, 3, 3)."""
+    """Add to load (n, 6, k) the torque, force that changes of the field, dB (k, m, 3), dG (k, m, 3, 3), make."""
     mu, a, f, t, u = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     for m in range(node.size):
         n = node[m]

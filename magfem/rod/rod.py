@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -163,21 +163,15 @@ class Rod:
             found = find_equilibrium(chain, loads, R, p, start, tolerance, most_iterations, leave_saddles, allowed)
         else:
             found = relax(chain, loads, R, p, start, tolerance, most_iterations)
-        snapped = guess is not None and expected < np.inf and _snapped(guess, found.factored, expected)
-        state = RodState(self, loads, found, snapped)
+        if region is not None and not np.all(region.contains(found.factored.acting.points)):
+            found = replace(found, outcome="outside")
         if strict and found.outcome == "outside" and region is not None:
             raise OutsideRegionError(
-                f"a magnet is pulled out of the field's region ({region.describe()}) before the rod finds an "
-                "equilibrium; strict=False returns the last shape within"
+                f"a magnet of the rod is pulled out of the field's region ({region.describe()}); strict=False returns "
+                'the last shape, outside="extrapolate" takes the field there as it is'
             )
-        if (strict or found.converged) and region is not None and len(found.factored.acting.points):
-            inside = np.asarray(region.contains(found.factored.acting.points))
-            if not inside.all():
-                worst = found.factored.acting.points[np.flatnonzero(~inside)[0]] * 1e3
-                raise OutsideRegionError(
-                    f"a magnet of the rod ends at ({worst[0]:.4g}, {worst[1]:.4g}, {worst[2]:.4g}) mm, outside the "
-                    f'field\'s region ({region.describe()}); outside="extrapolate" takes it as it is'
-                )
+        snapped = guess is not None and expected < np.inf and _snapped(guess, found.factored, expected)
+        state = RodState(self, loads, found, snapped)
         if strict and not found.converged:
             raise ConvergenceError(
                 f"the rod's shape did not converge ({found.outcome}): residual {state.residual:.1e} rad after "
@@ -192,10 +186,13 @@ class Rod:
 
 def _snapped(guess: RodState, found: Factored, expected: float) -> bool:
     """Whether the rod turned far more than the guess's own answer to the change of loads."""
-    from magfem.rod.equilibrium import largest_turn
+    return largest_turn(guess.frames, found.shape.R) > max(SNAP, 2 * expected)
 
-    turned = largest_turn(guess.frames, found.shape.R)
-    return turned > max(SNAP, 4 * expected)
+
+def largest_turn(before: Floats, after: Floats) -> float:
+    """rad, the most that any of the frames (n, 3, 3) has turned."""
+    least = float(np.einsum("nij,nij->n", before, after).min())
+    return float(np.arccos(np.clip((least - 1) / 2, -1.0, 1.0)))
 
 
 def _start(guess: RodState, chain: Chain) -> Floats:

@@ -168,8 +168,8 @@ class MagnetSection:
     @property
     def moment_vector(self) -> Floats:
         """(3,) A·m² in the magnet's axes."""
-        if is_number(self.moment) or (isinstance(self.moment, np.ndarray) and self.moment.ndim == 0):
-            return three("magnet section", "moment", (0.0, 0.0, float(self.moment)))  # type: ignore[arg-type]
+        if isinstance(self.moment, int | float | np.number | np.ndarray) and np.ndim(self.moment) == 0:
+            return three("magnet section", "moment", (0.0, 0.0, self.moment))  # type: ignore[arg-type]
         return three("magnet section", "moment", self.moment)
 
 

@@ -8,16 +8,16 @@ integrator that could wind up: what a limit cuts off is not remembered. Every st
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from magfem.errors import InputError, MagfemError
-from magfem.rod.bounded_step import bounded_step
+from magfem.rod.bounded_step import Step, bounded_step
 from magfem.rod.goals import Goal, GoalError, goal_error
-from magfem.rod.rod import Rod
+from magfem.rod.rod import SNAP, Rod, largest_turn
 from magfem.rod.state import RodState
 from magfem.rod.stiffness_estimate import StiffnessEstimate, stiffened, updated
 from magfem.typing import ArrayLike, Floats, Points
@@ -33,6 +33,7 @@ directions.  stalled: no progress for another reason, such as noise.  lost branc
 has no stable shape to go on to.  unreachable: no way was found on the model, whatever the start (`planning.plan`).
 """
 
+_PROGRESS = 0.02  # of the error: less is no progress
 _NOTICEABLE = 0.005  # of the stiffness: less is not worth a new model
 
 
@@ -58,7 +59,7 @@ class Steering:
     since: int = 0
     steps: int = 0
     condition: float = np.inf
-    stiffness: StiffnessEstimate = StiffnessEstimate()
+    stiffness: StiffnessEstimate = field(default_factory=StiffnessEstimate)
     in_use: float = 1.0
     route: tuple[Floats, ...] = ()
     plans: int = 0
@@ -80,7 +81,9 @@ class Controller:
     damping: of the pseudo-inverse, rad per A, while the error is above 0.1 rad; below it falls with the error.
     relaxation: the share of its currents that a step takes away where this costs no error by the model (the null-space
     task); it falls with the error as well, for what the model does not see of the plant would keep up an error.
-    adapt: whether the model takes on the stiffness that the measurements show.  tolerance: rad at which the goals are reached.  patience: steps without progress after which steering is stuck.
+    largest_condition: singular values below the largest over it are left out.  adapt: whether the model takes on the
+    stiffness that the measurements show.  tolerance: rad at which the goals are reached.  patience: steps without
+    progress after which steering is stuck.  room: the share of the current limits that is used.
     """
 
     rod: Rod
@@ -88,7 +91,7 @@ class Controller:
     goals: Sequence[Goal]
     gravity: ArrayLike = (0.0, 0.0, -9.81)
     current_step: float = 0.4
-    joint_step: float = np.radians(2.0)
+    joint_step: float = float(np.radians(2.0))
     current_limit: float | None = None
     joint_limits: ArrayLike | None = None
     gain: float = 0.5
@@ -97,7 +100,7 @@ class Controller:
     relaxation: float = 0.02
     largest_condition: float = 1e5
     adapt: bool = True
-    tolerance: float = np.radians(0.05)
+    tolerance: float = float(np.radians(0.05))
     patience: int = 60
     room: float = 1.0
 
@@ -117,7 +120,9 @@ class Controller:
     @cached_property
     def limits(self) -> tuple[Floats, Floats]:
         """Lowest and highest of all parameters (c + j,)."""
-        top = np.array([np.inf if one.current_limit is None else one.current_limit for one in self.system.coils])
+        top: Floats = np.array(
+            [np.inf if one.current_limit is None else one.current_limit for one in self.system.coils]
+        )
         if self.current_limit is not None:
             top = np.minimum(top, self.current_limit)
         if not np.isfinite(top).all():
@@ -150,56 +155,46 @@ class Controller:
         Where a centreline was measured, a magnet's turn about its own axis is not known: give any, and goals of
         directions and positions alone.
         """
-        error = goal_error(self.goals, positions, frames)
+        before, error = now, goal_error(self.goals, positions, frames)
+        now = replace(now, error=error, measured=(positions, frames), steps=now.steps + 1, expected=None)
         if now.route:
-            return self._on_the_way(replace(now, error=error, measured=(positions, frames), steps=now.steps + 1))
-        size = error.size
-        seen: dict[str, object] = {"error": error, "measured": (positions, frames), "steps": now.steps + 1}
-        if size < (1 - 0.02) * now.best:
-            seen |= {"best": size, "since": 0}
-        else:
-            seen |= {"since": now.since + 1}
-        if size <= self.tolerance:
-            return replace(now, outcome="converged", expected=None, **seen)
-        if self._jumped(now, positions, frames):
-            return replace(now, outcome="lost branch", expected=None, **seen)
+            return self._on_the_way(now)
+        better = error.size < (1 - _PROGRESS) * now.best
+        now = replace(now, best=error.size if better else now.best, since=0 if better else now.since + 1)
+        if error.size <= self.tolerance:
+            return replace(now, outcome="converged")
+        if _jumped(before, positions, frames):
+            return replace(now, outcome="lost branch")
         if self.adapt:
             now = self._adapted(now, positions, frames)
         jacobian = now.model.jacobian
         J = np.einsum("rms,msp->rp", error.slope, jacobian) * self.scale
-        parameters = now.parameters
-        wanted = -self.gain * np.clip(error.vector, -self.largest_error, self.largest_error)
-        low, high = self._room(parameters)
-        near = min(1.0, size / 0.1)
-        step = bounded_step(
-            J,
-            wanted,
-            low,
-            high,
-            self.damping * near**0.75,
-            -self.relaxation * near * np.where(np.arange(parameters.size) < self.coils, parameters, 0.0),
-            self.largest_condition,
-        )
-        change = step.change * self.scale
-        seen |= {"condition": step.condition}
-        if seen["since"] == self.patience:
-            at_limit = step.clamped & ((parameters <= self.limits[0] + 1e-9) | (parameters >= self.limits[1] - 1e-9))
-            word = "limit active" if at_limit.any() else "singular" if step.rank < len(J) else "stalled"
-            return replace(now, outcome=word, expected=None, **seen)
-        there = self._followed(now, change)
+        step = self._step(now, error, J)
+        now = replace(now, condition=step.condition)
+        if now.since >= self.patience:
+            low, high = self.limits
+            at_limit = step.clamped & ((now.parameters <= low + 1e-9) | (now.parameters >= high - 1e-9))
+            return replace(now, outcome=_why_stuck(bool(at_limit.any()), step.rank < len(J)))
+        there = self._followed(now, step.change * self.scale)
         if there is None:
-            return replace(now, outcome="lost branch", expected=None, **seen)
+            return replace(now, outcome="lost branch")
         parameters, model = there
-        expected = jacobian @ (parameters - now.parameters)
         return replace(
             now,
             currents=parameters[: self.coils],
             joints=parameters[self.coils :],
             model=model,
             outcome="moving",
-            expected=expected,
-            **seen,
+            expected=jacobian @ (parameters - now.parameters),
         )
+
+    def _step(self, now: Steering, error: GoalError, J: Floats) -> Step:
+        """The step, in units of `scale`, that takes away `gain` of the error."""
+        near = min(1.0, error.size / 0.1)
+        low, high = self._room(now.parameters)
+        wanted = -self.gain * np.clip(error.vector, -self.largest_error, self.largest_error)
+        rest = np.concatenate([-self.relaxation * near * now.currents, np.zeros(len(now.joints))])
+        return bounded_step(J, wanted, low, high, self.damping * near**0.75, rest, self.largest_condition)
 
     def _on_the_way(self, now: Steering) -> Steering:
         """One step along the route, as far as rates allow; the model goes along, or is solved anew where it cannot."""
@@ -207,11 +202,11 @@ class Controller:
         left = (now.route[0] - now.parameters) / self.scale
         part = min(1.0, float(np.min(np.where(left < 0, low, high) / np.where(left == 0, np.inf, left), initial=1.0)))
         there = now.parameters + part * left * self.scale
-        field = (self.system, there[: self.coils], there[self.coils :])
+        where = (self.system, there[: self.coils], there[self.coils :])
         rod, model = now.model.rod, now.model
         for guess in (now.model, None):
             try:
-                model = rod.solve(field, self.gravity, guess=guess, strict=False)
+                model = rod.solve(where, self.gravity, guess=guess, strict=False)
             except MagfemError:
                 continue
             if model.stable:
@@ -222,7 +217,6 @@ class Controller:
             joints=there[self.coils :],
             model=model,
             outcome="moving",
-            expected=None,
             best=np.inf,
             since=0,
             route=now.route[1:] if part == 1.0 else now.route,
@@ -234,9 +228,9 @@ class Controller:
         factor = estimate.factor
         if abs(factor / now.in_use - 1) < _NOTICEABLE:
             return replace(now, stiffness=estimate)
-        field = (self.system, now.currents, now.joints)
+        where = (self.system, now.currents, now.joints)
         try:
-            model = stiffened(self.rod, factor).solve(field, self.gravity, guess=now.model, strict=False)
+            model = stiffened(self.rod, factor).solve(where, self.gravity, guess=now.model, strict=False)
         except MagfemError:
             return replace(now, stiffness=estimate)
         if not model.stable:
@@ -257,20 +251,24 @@ class Controller:
         parameters = now.parameters
         for part in (1.0, 0.3, 0.1):
             there = np.clip(parameters + part * change, *self.limits)
-            field = (self.system, there[: self.coils], there[self.coils :])
+            where = (self.system, there[: self.coils], there[self.coils :])
             try:
-                model = now.model.rod.solve(field, self.gravity, guess=now.model, strict=False)
+                model = now.model.rod.solve(where, self.gravity, guess=now.model, strict=False)
             except MagfemError:
                 continue
             if model.stable and not model.snapped:
                 return there, model
         return None
 
-    def _jumped(self, now: Steering, positions: Points, frames: Floats) -> bool:
-        """Whether the plant moved far more in one step than the model expected: it has snapped to another branch."""
-        if now.expected is None or now.measured is None:
-            return False
-        relative = frames @ now.measured[1].transpose(0, 2, 1)
-        turned = np.arccos(np.clip((np.trace(relative, axis1=1, axis2=2) - 1) / 2, -1, 1))
-        thought = np.linalg.norm(now.expected[:, 3:], axis=1)
-        return bool(np.any(turned > np.maximum(np.radians(15.0), 8 * thought)))
+
+def _why_stuck(at_limit: bool, singular: bool) -> str:
+    return "limit active" if at_limit else "singular" if singular else "stalled"
+
+
+def _jumped(before: Steering, positions: Points, frames: Floats) -> bool:
+    """Whether the plant moved far more in one step than the model expected: it has snapped to another branch."""
+    if before.expected is None or before.measured is None:
+        return False
+    turned = [largest_turn(a[None], b[None]) for a, b in zip(before.measured[1], frames, strict=True)]
+    thought = np.linalg.norm(before.expected[:, 3:], axis=1)
+    return bool(np.any(np.array(turned) > np.maximum(SNAP, 8 * thought)))

@@ -45,7 +45,8 @@ def updated(
     moduli = np.array([one.youngs_modulus for one in model.rod.sections if isinstance(one, FlexibleSection)])
     frames = model.magnet_frames[:, :, 2]
     shift = moved.positions[nodes] @ moduli / POSITION_SCALE
-    turn = np.cross(moved.rotations[nodes] @ moduli, frames)
+    a, b = moved.rotations[nodes] @ moduli, frames
+    turn = a[:, [1, 2, 0]] * b[:, [2, 0, 1]] - a[:, [2, 0, 1]] * b[:, [1, 2, 0]]
     slope = np.concatenate([shift, turn]).ravel()
     misfit = np.concatenate([(positions - model.magnet_positions) / POSITION_SCALE, axes - frames]).ravel()
     information = float(slope @ slope)
