@@ -9,7 +9,7 @@ import numpy as np
 from magfem.errors import InputError
 from magfem.rod.centreline import Centreline
 from magfem.rod.centreline_basis import centreline_basis
-from magfem.rod.curve_fit import Task, fit_curve, nearest_places, seen_as_they_are
+from magfem.rod.curve_fit import PointCloud, Task, fit_curve, nearest_places
 from magfem.typing import ArrayLike, Floats, Points
 
 if TYPE_CHECKING:
@@ -49,9 +49,8 @@ def fit_centreline(
     Raises InputError for data that cannot be used, ConvergenceError when no curve of the length fits half of them.
     """
     data = finite(points, "points", (-1, 3))
-    task = Task(
-        *rod_of(length, base, base_tangent, straight, degree), data, seen_as_they_are, arc_lengths is None, robust
-    )
+    rod = rod_of(length, base, base_tangent, straight, degree)
+    task = Task(*rod, PointCloud(data), slide=arc_lengths is None, robust=robust)
     enough(task, len(data))
     if arc_lengths is not None:
         s = finite(arc_lengths, "arc lengths", (len(data),))

@@ -8,8 +8,8 @@ that a stretch of 1 weighs like a shift of all data by `STIFFNESS` lengths. With
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from magfem.errors import ConvergenceError
 from magfem.rod.centreline import Centreline
 from magfem.rod.centreline_basis import CentrelineBasis
 from magfem.rod.robust_scale import TUNING, biweight, biweight_spread, scale_of
-from magfem.typing import Floats, Points
+from magfem.typing import Floats, Integers, Points
 
 STIFFNESS = 3.0
 _STEPS = 100
@@ -26,18 +26,50 @@ _NO_OUTLIER = 1e-6  # times the data's extent: a scatter below which no datum is
 _SETTLED = 1e-3  # squared step, in standard deviations of the estimate
 _SMALLER = 0.7  # a scale found this much smaller after Tukey's weights is worth another round
 
-View = Callable[[Points], tuple[Floats, Floats]]
-"""From points (n, 3) m, one per datum, to what is seen of them (n, d) and the derivatives (n, d, 3)."""
+
+class Data(Protocol):
+    """Data (n, d) of one unit, and how the curve's own points map to them."""
+
+    @property
+    def values(self) -> Floats:
+        """(n, d)."""
+        ...
+
+    def seen(self, points: Points) -> tuple[Floats, Floats]:
+        """What points (n, 3) m, one per datum, would be seen as, (n, d), and the derivatives (n, d, 3)."""
+        ...
+
+    def nearest(self, points: Points) -> Integers:
+        """(n,) which of points (m, 3) m is seen nearest to each datum."""
+        ...
 
 
-def seen_as_they_are(points: Points) -> tuple[Floats, Floats]:
-    """The view of a point cloud."""
-    return points, np.broadcast_to(np.eye(3), (len(points), 3, 3))
+@dataclass(frozen=True)
+class PointCloud:
+    """Points (n, 3) m, seen as they are."""
+
+    values: Floats
+
+    def seen(self, points: Points) -> tuple[Floats, Floats]:
+        """The points themselves."""
+        return points, np.broadcast_to(np.eye(3), (len(points), 3, 3))
+
+    def nearest(self, points: Points) -> Integers:
+        """By distance in space."""
+        return nearest_of(self.values, points)
+
+
+def nearest_of(data: Floats, candidates: Floats) -> Integers:
+    """(n,) which of the candidates (m, d) is nearest to each datum (n, d)."""
+    middle = data.mean(axis=0)
+    shifted = candidates - middle
+    found: Integers = np.argmin(np.sum(shifted**2, axis=-1) - 2 * (data - middle) @ shifted.T, axis=1)
+    return found
 
 
 @dataclass(frozen=True)
 class Task:
-    """What is fitted: data (n, d) seen by `view`, on a rod of `basis` with its base (3,) m and tangent there, or None.
+    """What is fitted: data, on a rod of `basis` with its base (3,) m and unit tangent there, or None.
 
     slide: whether the data's places along the rod are found along.  robust: whether outliers are weighed down.
     """
@@ -45,8 +77,7 @@ class Task:
     basis: CentrelineBasis
     base: Floats
     base_tangent: Floats | None
-    data: Floats
-    view: View
+    data: Data
     slide: bool
     robust: bool
 
@@ -59,9 +90,7 @@ class Task:
 def nearest_places(task: Task, curve: Centreline, samples: int = 97) -> Floats:
     """Arc lengths (n,) m, to one part in `samples`, at which the curve passes nearest to each datum."""
     s = np.linspace(0.0, curve.length, samples)
-    points = curve.position(s)
-    seen = np.stack([task.view(np.broadcast_to(p, (len(task.data), 3)))[0] for p in points], axis=1)
-    return s[np.argmin(np.sum((seen - task.data[:, None]) ** 2, axis=-1), axis=1)]
+    return s[task.data.nearest(curve.position(s))]
 
 
 def fit_curve(task: Task, coefficients: Floats | None, s: Floats, rough: bool) -> Centreline:
@@ -71,11 +100,12 @@ def fit_curve(task: Task, coefficients: Floats | None, s: Floats, rough: bool) -
     half of the data.
     """
     basis, length = task.basis, task.basis.length
-    count, coordinates = len(task.data), task.data.shape[1] - task.slide
+    data = task.data.values
+    count, coordinates = len(data), data.shape[1] - task.slide
     c = np.zeros((basis.count, 3)) if coefficients is None else coefficients.copy()
     nodes, node_weights = basis.quadrature
     freedom = max(coordinates * count - c.size, 1) / (coordinates * count)
-    extent = float(np.abs(task.data - task.data.mean(0)).max())
+    extent = float(np.abs(data - data.mean(axis=0)).max())
     rounding, smallest = 1e-13 * extent, _NO_OUTLIER * extent
     rough_left = _ROUGH_STEPS[rough] if task.robust else 0
     scale, limit = np.inf, np.inf
@@ -85,8 +115,8 @@ def fit_curve(task: Task, coefficients: Floats | None, s: Floats, rough: bool) -
         piece, values = basis.local(s)
         functions = np.einsum("nd,ndk->nk", values, basis.tables[0, piece])
         position, slope = np.einsum("nd,jndc->jnc", values, curve.pieces[:2, piece])
-        seen, view = task.view(position + task.base)
-        away = task.data - seen
+        seen, view = task.data.seen(position + task.base)
+        away = data - seen
         lengths = np.sqrt(np.sum(away**2, axis=-1))
         across = view
         if task.slide:
