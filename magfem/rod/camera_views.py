@@ -7,15 +7,18 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from magfem.errors import ConvergenceError, InputError
 from magfem.rod.cameras import Camera, triangulate
 from magfem.rod.centreline import Centreline
-from magfem.rod.centreline_fit import adopted, enough, finite, rod_of, rough_shape, walked
+from magfem.rod.centreline_fit import adopted, enough, finite, in_company, rod_of, rough_shape, walked
 from magfem.rod.curve_fit import Task, fit_curve, nearest_of, nearest_places
-from magfem.typing import ArrayLike, Floats, Integers, Points
+from magfem.rod.moving_frame import smallest_turn
+from magfem.typing import ArrayLike, Floats, Integers, Points, Vectors
 
 _NODES = 60  # of the line through each picture's pixels, along which the pictures are matched
+_BENDS, _WAYS, _BEST = (0.6, 1.2, 2.0, 2.8), 8, 4  # arcs to start from: how far bent, in how many directions, how many
 
 
 @dataclass(frozen=True)
@@ -165,19 +168,53 @@ def match_lines(cameras: Sequence[Camera], lines: Sequence[Floats]) -> tuple[Int
 
 
 def _starts(task: Task, cameras: Sequence[Camera], seen: list[Floats]) -> list[Floats]:
-    """Coefficients (K, 3) to start from: of the matched pictures first."""
+    """Coefficients (K, 3) to start from: of the matched pictures, and those arcs whose pictures are nearest.
+
+    Where a rod points into a camera its picture folds back on itself, and matching along lines fails.
+    """
+    starts, tangent, straight_on = [], task.base_tangent, task.basis.length
     lines = [_line(camera.project(task.base), view) for camera, view in zip(cameras[:2], seen[:2], strict=True)]
     first, second = match_lines(cameras[:2], lines)
     try:
         points = triangulate(cameras[:2], np.stack([lines[0][first], lines[1][second]])).points
     except InputError:
-        return []
-    s = walked(points, task.base, task.basis.length, ordered=True)
-    return [rough_shape(task, points, s)]
+        pass
+    else:
+        s = walked(points, task.base, straight_on, ordered=True)
+        starts.append(rough_shape(task, points, s))
+        if tangent is None:
+            tangent = task.curve(starts[0]).tangent(0.0)
+    if tangent is not None:
+        arcs = [_arc(task, tangent, bend, way) for bend in _BENDS for way in np.arange(_WAYS) * 2 * np.pi / _WAYS]
+        starts += sorted(arcs, key=lambda c: _distance(task, c))[:_BEST]
+    return starts
+
+
+def _arc(task: Task, tangent: Vectors, bend: float, way: float) -> Floats:
+    """Coefficients (K, 3) of a circle's arc that turns by `bend` rad from the unit tangent (3,) at the base."""
+    side = Rotation.from_quat(smallest_turn(tangent)).apply([np.cos(way), np.sin(way), 0.0])
+    s, weights = task.basis.quadrature
+    angle = bend * s / task.basis.length
+    place = (np.sin(angle)[:, None] * tangent + (1 - np.cos(angle))[:, None] * side) * task.basis.length / bend
+    if task.base_tangent is not None:
+        place = place - s[:, None] * task.base_tangent
+    found: Floats = task.basis.functions(s).T @ (weights[:, None] * place)
+    return found
+
+
+def _distance(task: Task, coefficients: Floats) -> float:
+    """Median distance of the data from a curve's pictures, px; infinite when the curve leaves a camera's front."""
+    curve = task.curve(coefficients)
+    try:
+        seen = task.data.seen(curve.position(nearest_places(task, curve)))[0]
+    except InputError:
+        return np.inf
+    return float(np.median(np.linalg.norm(task.data.values - seen, axis=-1)))
 
 
 def _line(base: Floats, pixels: Floats) -> Floats:
     """Nodes (n, 2) px from base to tip along pixels (m, 2): medians of those that lie equally far along."""
+    pixels = pixels[in_company(pixels)]
     reach = float(np.linalg.norm(np.ptp(pixels, axis=0))) * 4
     order = np.argsort(walked(pixels, base, reach, ordered=False))
     groups = np.array_split(order, min(_NODES, max(len(order) // 3, 2)))

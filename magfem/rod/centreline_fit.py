@@ -10,7 +10,7 @@ from magfem.errors import InputError
 from magfem.rod.centreline import Centreline
 from magfem.rod.centreline_basis import centreline_basis
 from magfem.rod.curve_fit import PointCloud, Task, fit_curve, nearest_places
-from magfem.typing import ArrayLike, Floats, Points
+from magfem.typing import ArrayLike, Booleans, Floats, Points
 
 if TYPE_CHECKING:
     from magfem.rod.centreline_basis import CentrelineBasis
@@ -60,8 +60,9 @@ def fit_centreline(
     if start is not None:
         c = adopted(start, task)
         return fit_curve(task, c, nearest_places(task, task.curve(c)), rough=False)
-    s = walked(data, task.base, length, ordered)
-    return fit_curve(task, rough_shape(task, data, s), s, rough=True)
+    crowd = data if ordered else data[in_company(data)]
+    c = rough_shape(task, crowd, walked(crowd, task.base, length, ordered))
+    return fit_curve(task, c, nearest_places(task, task.curve(c)), rough=True)
 
 
 def rod_of(
@@ -113,6 +114,19 @@ def adopted(start: Centreline, task: Task) -> Floats:
         place = place - s[:, None] * task.base_tangent
     found: Floats = task.basis.functions(s).T @ (weights[:, None] * place)
     return found
+
+
+def in_company(points: Points) -> Booleans:
+    """(n,) which points (n, d) have their fourth neighbour no farther than four times the median of that distance.
+
+    Outliers that are scattered thinly have not. It only serves cold starts: the fit itself weighs all data.
+    """
+    from scipy.spatial import cKDTree
+
+    if len(points) < 10:
+        return np.ones(len(points), dtype=bool)
+    reach = cKDTree(points).query(points, k=5)[0][:, -1]
+    return np.asarray(reach <= 4 * np.median(reach))
 
 
 def walked(points: Points, base: Floats, length: float, ordered: bool) -> Floats:

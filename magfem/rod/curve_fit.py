@@ -20,10 +20,12 @@ from magfem.rod.robust_scale import TUNING, biweight, biweight_spread, scale_of
 from magfem.typing import Floats, Integers, Points
 
 STIFFNESS = 3.0
-_STEPS = 100
+_STEPS, _PATIENCE = 100, 30
 _ROUGH_STEPS = {True: 8, False: 2}  # with weights 1/r, before Tukey's, from a start far off or near
+_FARTHEST = 0.1  # of the length, that a datum's place moves in one step: where a rod points into a camera it would leap
 _NO_OUTLIER = 1e-6  # times the data's extent: a scatter below which no datum is called wrong
-_SETTLED = 1e-3  # squared step, in standard deviations of the estimate
+_SETTLED, _NEARLY = 1e-3, 0.1  # squared step, in standard deviations of the estimate; the latter after some patience,
+# where data leap to and fro between two branches of a folded picture
 _SMALLER = 0.7  # a scale found this much smaller after Tukey's weights is worth another round
 
 
@@ -150,17 +152,20 @@ def fit_curve(task: Task, coefficients: Floats | None, s: Floats, rough: bool) -
         step = np.linalg.solve(hessian, rhs.ravel()).reshape(c.shape)
         c = c + step
         if task.slide:
-            s = np.clip(s + shift - np.sum(pull * (functions @ step), axis=-1), 0.0, length)
+            farthest = _FARTHEST * length
+            s = s + np.clip(shift - np.sum(pull * (functions @ step), axis=-1), -farthest, farthest)
+            s = np.clip(s, 0.0, length)
         kept = lengths < limit
         noise = max(float(np.sqrt(np.mean(lengths[kept] ** 2) / coordinates)), rounding)
         move = float(rhs.ravel() @ step.ravel()) / noise**2
         rough_left -= 1
-        if rough_left < 0 and (move < _SETTLED or np.linalg.norm(step) < 1e-12 * length):
+        settled = _SETTLED if iteration < _PATIENCE else _NEARLY
+        if rough_left < 0 and (move < settled or np.linalg.norm(step) < 1e-12 * length):
             found = max(scale_of(lengths, coordinates) / np.sqrt(freedom), smallest)
             if not (task.robust and again and found < _SMALLER * scale):
                 break
             again, scale, limit = False, found, TUNING[coordinates] * found
-    if move > 100 * _SETTLED:
+    else:
         raise ConvergenceError(
             f"centreline: the fit did not settle in {_STEPS} steps; a start nearer to the rod, a lower degree or "
             f"fewer outliers would help"
