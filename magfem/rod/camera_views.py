@@ -158,11 +158,11 @@ def match_lines(cameras: Sequence[Camera], lines: Sequence[Floats]) -> tuple[Int
         came[i, j] = np.argmin(ways, axis=0)
         total[i, j] = cost[i - 1, j - 1] + ways.min(axis=0)
     pairs = []
-    i, j = n, m
-    while i > 0 and j > 0:
-        pairs.append((i - 1, j - 1))
-        way = came[i, j]
-        i, j = i - (way != 2), j - (way != 1)
+    row, column = n, m
+    while row > 0 and column > 0:
+        pairs.append((row - 1, column - 1))
+        way = came[row, column]
+        row, column = row - int(way != 2), column - int(way != 1)
     matched = np.array(pairs[::-1])
     return matched[:, 0], matched[:, 1]
 

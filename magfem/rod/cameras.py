@@ -60,6 +60,11 @@ class Camera:
         return np.asarray(self.pose.translation)
 
     @cached_property
+    def axes(self) -> Floats:
+        """(3, 3), columns the camera's x, y and z in the world."""
+        return np.asarray(self.pose.rotation.as_matrix())
+
+    @cached_property
     def matrix(self) -> Floats:
         """P (3, 4): homogeneous pixels of homogeneous points, K [R | t]."""
         (fx, fy), (cx, cy) = self.focal_length, self.principal_point
@@ -84,8 +89,9 @@ class Camera:
         """Unit vectors (..., 3) in the world from the centre towards what pixels (..., 2) show."""
         offset = (np.asarray(pixels, dtype=float) - self.principal_point) / self.focal_length
         ahead = np.concatenate([offset, np.ones((*offset.shape[:-1], 1))], axis=-1)
-        found: Vectors = ahead @ self.pose.rotation.as_matrix().T
-        return found / np.linalg.norm(found, axis=-1, keepdims=True)
+        found: Vectors = ahead @ self.axes.T
+        found /= np.linalg.norm(found, axis=-1, keepdims=True)
+        return found
 
 
 @dataclass(frozen=True)

@@ -141,8 +141,8 @@ class Centreline:
         speed = np.linalg.norm(first, axis=-1)[:, None, None]
         t = first / speed[:, 0]
         turn = (np.eye(3) - t[:, :, None] * t[:, None, :]) / speed
-        found = turn @ self._spread(self.basis.functions(arc.ravel(), 1)) @ turn
-        return np.asarray(found.reshape(*arc.shape, 3, 3))
+        found: Floats = (turn @ self._spread(self.basis.functions(arc.ravel(), 1)) @ turn).reshape(*arc.shape, 3, 3)
+        return found
 
     def _spread(self, functions: Floats) -> Floats:
         count = functions.shape[1]

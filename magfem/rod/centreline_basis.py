@@ -43,7 +43,9 @@ class CentrelineBasis:
         if not 0 < self.length < np.inf:
             raise InputError(f"centreline: the rod's length must be positive and finite, got {self.length!r} m")
         if isinstance(self.degree, bool) or not isinstance(self.degree, int) or not 2 <= self.degree <= HIGHEST_DEGREE:
-            raise InputError(f"centreline: degree must be a whole number from 2 to {HIGHEST_DEGREE}, got {self.degree!r}")
+            raise InputError(
+                f"centreline: degree must be a whole number from 2 to {HIGHEST_DEGREE}, got {self.degree!r}"
+            )
         last = 0.0
         for start, end in self.straight:
             if not last <= start < end <= self.length * (1 + 1e-9):
@@ -65,7 +67,10 @@ class CentrelineBasis:
     def flexible(self) -> Booleans:
         """(P,) which pieces bend."""
         middle = (self.breaks[1:] + self.breaks[:-1]) / 2
-        return ~np.any([(start < middle) & (middle < end) for start, end in self.straight] or [middle < 0], axis=0)
+        flexible = np.ones(middle.size, dtype=bool)
+        for start, end in self.straight:
+            flexible &= (middle < start) | (middle > end)
+        return flexible
 
     @cached_property
     def count(self) -> int:
@@ -136,7 +141,7 @@ class CentrelineBasis:
         return self.functions(self.quadrature[0], 1)
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=64, typed=True)
 def centreline_basis(length: float, straight: Stretches, degree: int, free_tangent: bool) -> CentrelineBasis:
     """The same basis for the same rod, so that its tables are made once."""
     return CentrelineBasis(length, straight, degree, free_tangent)

@@ -9,23 +9,25 @@ that a stretch of 1 weighs like a shift of all data by `STIFFNESS` lengths. With
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
 
-from magfem.errors import ConvergenceError
+from magfem.errors import ConvergenceError, InputError
 from magfem.rod.centreline import Centreline
 from magfem.rod.centreline_basis import CentrelineBasis
 from magfem.rod.robust_scale import TUNING, biweight, biweight_spread, scale_of
 from magfem.typing import Floats, Integers, Points
 
-STIFFNESS = 3.0
+STIFFNESS, _COLD = 0.05, 1.0  # the latter on the way from a start far off
 _STEPS, _PATIENCE = 100, 30
 _ROUGH_STEPS = {True: 8, False: 2}  # with weights 1/r, before Tukey's, from a start far off or near
 _FARTHEST = 0.1  # of the length, that a datum's place moves in one step: where a rod points into a camera it would leap
-_NO_OUTLIER = 1e-6  # times the data's extent: a scatter below which no datum is called wrong
-_SETTLED, _NEARLY = 1e-3, 0.1  # squared step, in standard deviations of the estimate; the latter after some patience,
-# where data leap to and fro between two branches of a folded picture
+_NO_OUTLIER = 1e-4  # times the data's extent: a scatter below which no datum is called wrong; cameras see no finer
+_SETTLED, _NEARLY = 1e-2, 0.1  # squared step, in standard deviations of the estimate; the latter when
+# patience ends: data may leap to and fro between two branches of a folded picture
+_UNDETERMINED = 1e-10  # smallest share of the largest eigenvalue of the functions, which are orthonormal over the rod
 _SMALLER = 0.7  # a scale found this much smaller after Tukey's weights is worth another round
 
 
@@ -83,6 +85,11 @@ class Task:
     slide: bool
     robust: bool
 
+    @property
+    def coordinates(self) -> int:
+        """Of every datum, those that say something: where places are unknown, not the one along the curve."""
+        return int(self.data.values.shape[1]) - self.slide
+
     def curve(self, coefficients: Floats) -> Centreline:
         """The curve of coefficients (K, 3), without statistics."""
         size = coefficients.size
@@ -99,69 +106,36 @@ def fit_curve(task: Task, coefficients: Floats | None, s: Floats, rough: bool) -
     """From coefficients (K, 3), or the straight rod, and places (n,) m of the data to the centreline.
 
     rough: whether the start may be far off. Raises ConvergenceError when the fit does not settle, or keeps less than
-    half of the data.
+    half of the data, InputError when they leave part of the curve open.
     """
-    basis, length = task.basis, task.basis.length
-    data = task.data.values
-    count, coordinates = len(data), data.shape[1] - task.slide
-    c = np.zeros((basis.count, 3)) if coefficients is None else coefficients.copy()
-    nodes, node_weights = basis.quadrature
-    freedom = max(coordinates * count - c.size, 1) / (coordinates * count)
+    c = np.zeros((task.basis.count, 3)) if coefficients is None else coefficients
+    data, coordinates = task.data.values, task.coordinates
     extent = float(np.abs(data - data.mean(axis=0)).max())
     rounding, smallest = 1e-13 * extent, _NO_OUTLIER * extent
+    free = 1 - min(c.size, coordinates * len(data) - 1) / (coordinates * len(data))
     rough_left = _ROUGH_STEPS[rough] if task.robust else 0
     scale, limit = np.inf, np.inf
     again = True  # once: were the scale to follow the weights at every step, it could shrink for ever
     for iteration in range(1, _STEPS + 1):
-        curve = task.curve(c)
-        piece, values = basis.local(s)
-        functions = np.einsum("nd,ndk->nk", values, basis.tables[0, piece])
-        position, slope = np.einsum("nd,jndc->jnc", values, curve.pieces[:2, piece])
-        seen, view = task.data.seen(position + task.base)
-        away = data - seen
-        lengths = np.sqrt(np.sum(away**2, axis=-1))
-        across = view
-        if task.slide:
-            along = np.einsum("ndc,nc->nd", view, slope)
-            speed = np.sum(along**2, axis=-1)
-            shift = np.sum(along * away, axis=-1) / speed
-            away = away - along * shift[:, None]
-            pull = np.einsum("nd,ndc->nc", along, view) / speed[:, None]
-            across = view - along[:, :, None] * pull[:, None, :]
-        weight = np.ones(count)
+        near = _linearised(task, c, s)
+        weight = np.ones(len(data))
         if task.robust:
+            found = max(scale_of(near.lengths, coordinates) / np.sqrt(free), smallest)
             if rough_left >= 0:
-                scale = max(scale_of(lengths, coordinates) / np.sqrt(freedom), smallest)
-                limit = TUNING[coordinates] * scale
-            weight = biweight(lengths, limit) if rough_left <= 0 else 1 / np.maximum(lengths / scale, 0.3)
-        information = np.einsum("nda,ndb->nab", across, across)
-        hessian, stiffness = _normal_matrix(functions, weight[:, None, None] * information), 0.0
-        rhs = functions.T @ (weight[:, None] * np.einsum("nda,nd->na", across, away))
-        if task.slide:
-            mean = float(np.einsum("n,naa->", weight, information)) / coordinates
-            speed_there = np.einsum("qk,kc->qc", basis.slopes, c)
-            if task.base_tangent is not None:
-                speed_there = speed_there + task.base_tangent
-            size = np.linalg.norm(speed_there, axis=-1)
-            tangent = speed_there / size[:, None]
-            pressing = mean * (STIFFNESS * length) ** 2 * node_weights
-            stiffness = _normal_matrix(basis.slopes, pressing[:, None, None] * tangent[:, :, None] * tangent[:, None])
-            hessian = hessian + stiffness
-            rhs = rhs + basis.slopes.T @ ((pressing * (1 - size))[:, None] * tangent)
-        hessian[np.diag_indices(c.size)] += 1e-12 * np.trace(hessian) / c.size
+                scale, limit = found, TUNING[coordinates] * found
+            weight = 1 / np.maximum(near.lengths / scale, 0.3) if rough_left > 0 else biweight(near.lengths, limit)
+        hessian, rhs, _ = _equations(task, c, near, weight, _COLD if rough_left > 0 else STIFFNESS)
         step = np.linalg.solve(hessian, rhs.ravel()).reshape(c.shape)
         c = c + step
         if task.slide:
-            farthest = _FARTHEST * length
-            s = s + np.clip(shift - np.sum(pull * (functions @ step), axis=-1), -farthest, farthest)
-            s = np.clip(s, 0.0, length)
-        kept = lengths < limit
-        noise = max(float(np.sqrt(np.mean(lengths[kept] ** 2) / coordinates)), rounding)
+            moved = np.clip(near.shift - np.sum(near.pull * (near.functions @ step), axis=-1), -_FARTHEST, _FARTHEST)
+            s = np.clip(s + moved * task.basis.length, 0.0, task.basis.length)
+        kept = near.lengths < limit
+        noise = max(float(np.sqrt(np.mean(near.lengths[kept] ** 2) / coordinates)), rounding)
         move = float(rhs.ravel() @ step.ravel()) / noise**2
         rough_left -= 1
         settled = _SETTLED if iteration < _PATIENCE else _NEARLY
-        if rough_left < 0 and (move < settled or np.linalg.norm(step) < 1e-12 * length):
-            found = max(scale_of(lengths, coordinates) / np.sqrt(freedom), smallest)
+        if rough_left < 0 and (move < settled or np.linalg.norm(step) < 1e-12 * task.basis.length):
             if not (task.robust and again and found < _SMALLER * scale):
                 break
             again, scale, limit = False, found, TUNING[coordinates] * found
@@ -174,21 +148,90 @@ def fit_curve(task: Task, coefficients: Floats | None, s: Floats, rough: bool) -
         raise ConvergenceError(
             f"centreline: only {np.mean(kept):.0%} of the data lie on one curve of this length, expected at least half"
         )
-    # Scatter of an M-estimate: D⁻¹ (A JᵀJ) D⁻¹ with D = B JᵀJ + the stiffness, over the data that count.
-    if task.robust:
-        square, bend = biweight_spread(lengths, limit, coordinates)
-        weighted = float(np.mean(biweight(lengths[kept], limit) * lengths[kept] ** 2))
-        variance = weighted / (coordinates * bend)
-    else:
-        square, bend = float(np.mean(lengths**2)) / coordinates, 1.0
-        variance = square
-    data_part = _normal_matrix(functions[kept], information[kept])
-    inverse = np.linalg.inv(bend * data_part + stiffness)
+    covariance, deviation = _statistics(task, c, near, limit)
+    return Centreline(task.basis, task.base, task.base_tangent, c, covariance, deviation, kept, iteration)
+
+
+@dataclass(frozen=True)
+class _Linearised:
+    """Residuals near a curve: `away` (n, d) changes by −across (n, d, 3) times the change of position.
+
+    lengths: (n,) of the residuals.  functions: (n, K) at the data's places.  shift, pull: by how many lengths of the
+    rod each place moves, (n,), and how much less for a change of position, (n, 3); zero where places are known.
+    information: (n, 3, 3), acrossᵀ across.
+    """
+
+    lengths: Floats
+    functions: Floats
+    away: Floats
+    across: Floats
+    shift: Floats
+    pull: Floats
+
+    @cached_property
+    def information(self) -> Floats:
+        found: Floats = np.einsum("nda,ndb->nab", self.across, self.across)
+        return found
+
+
+def _linearised(task: Task, c: Floats, s: Floats) -> _Linearised:
+    piece, values = task.basis.local(s)
+    functions = np.einsum("nd,ndk->nk", values, task.basis.tables[0, piece])
+    position, slope = np.einsum("nd,jndc->jnc", values, task.curve(c).pieces[:2, piece])
+    seen, view = task.data.seen(position + task.base)
+    away = task.data.values - seen
+    lengths = np.sqrt(np.sum(away**2, axis=-1))
+    if not task.slide:
+        return _Linearised(lengths, functions, away, view, np.zeros(len(s)), np.zeros((len(s), 3)))
+    along = np.einsum("ndc,nc->nd", view, slope) * task.basis.length
+    speed = np.sum(along**2, axis=-1)
+    shift = np.sum(along * away, axis=-1) / speed
+    pull = np.einsum("nd,ndc->nc", along, view) / speed[:, None]
+    across = view - along[:, :, None] * pull[:, None, :]
+    return _Linearised(lengths, functions, away - along * shift[:, None], across, shift, pull)
+
+
+def _equations(task: Task, c: Floats, near: _Linearised, weight: Floats, stiff: float) -> tuple[Floats, Floats, Floats]:
+    """Gauss–Newton's matrix (3K, 3K), right-hand side (K, 3), and that part of the matrix which holds the length."""
+    hessian = _normal_matrix(near.functions, weight[:, None, None] * near.information)
+    rhs = near.functions.T @ (weight[:, None] * np.einsum("nda,nd->na", near.across, near.away))
+    stiffness = np.zeros_like(hessian)
+    if task.slide:
+        speed = task.basis.slopes @ c + (0.0 if task.base_tangent is None else task.base_tangent)
+        size = np.linalg.norm(speed, axis=-1)
+        tangent = speed / size[:, None]
+        mean = float(np.einsum("n,naa->", weight, near.information)) / task.coordinates
+        pressing = mean * (stiff * task.basis.length) ** 2 * task.basis.quadrature[1]
+        stiffness = _normal_matrix(task.basis.slopes, pressing[:, None, None] * tangent[:, :, None] * tangent[:, None])
+        hessian = hessian + stiffness
+        rhs = rhs + task.basis.slopes.T @ ((pressing * (1 - size))[:, None] * tangent)
+    hessian[np.diag_indices(c.size)] += 1e-12 * np.trace(hessian) / c.size
+    return hessian, rhs, stiffness
+
+
+def _statistics(task: Task, c: Floats, near: _Linearised, limit: float) -> tuple[Floats, float]:
+    """Covariance (3K, 3K) of the coefficients, D⁻¹ (A JᵀJ) D⁻¹ with D = B JᵀJ + stiffness, and the data's deviation.
+
+    JᵀJ is over the data within the limit; what holds the length is exact and adds no scatter.
+    """
+    kept, coordinates = near.lengths < limit, task.coordinates
+    square, bend = biweight_spread(near.lengths, limit, coordinates)
+    pulled = float(np.mean(biweight(near.lengths[kept], limit) * near.lengths[kept] ** 2))
+    data_part = _normal_matrix(near.functions[kept], near.information[kept])
+    stiffness = _equations(task, c, near, kept.astype(float), STIFFNESS)[2]
+    whole = bend * data_part + stiffness
+    spread = np.linalg.eigvalsh(whole)
+    if not spread[0] > _UNDETERMINED * spread[-1]:
+        raise InputError(
+            "centreline: the data lie on too little of the rod to fix its curve; a lower degree or data all along it "
+            "would"
+        )
+    inverse = np.linalg.inv(whole)
     fitted = bend * float(np.sum(inverse * data_part))  # parameters that the data, not the length, decide
-    correction = coordinates * kept.sum() / max(coordinates * kept.sum() - fitted, 1.0)
-    covariance = square * correction * inverse @ data_part @ inverse
-    return Centreline(
-        basis, task.base, task.base_tangent, c, covariance, float(np.sqrt(variance * correction)), kept, iteration
+    values = coordinates * int(kept.sum())
+    correction = values / max(values - fitted, 1.0)
+    return square * correction * inverse @ data_part @ inverse, float(
+        np.sqrt(pulled / (coordinates * bend) * correction)
     )
 
 

@@ -31,6 +31,8 @@ def biweight_spread(lengths: Floats, limit: float, coordinates: int) -> tuple[fl
     is σ² = E[ψ·r]/(coordinates · B), exactly, by Stein's identity.
     """
     kept = lengths[lengths < limit]
+    if np.isinf(limit):
+        return float(np.mean(kept**2)) / coordinates, 1.0
     share = (kept / limit) ** 2
     weight = (1 - share) ** 2
     bend = weight - 4 * share * (1 - share) / coordinates
