@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform
 
 from magfem.errors import ConvergenceError, InputError, OutsideRegionError
-from magfem.rod.sections import FlexibleSection, MagnetSection, three
+from magfem.rod.sections import FlexibleSection, MagnetSection, positive, three
 from magfem.typing import ArrayLike, Floats, Points
 
 if TYPE_CHECKING:
@@ -49,8 +49,8 @@ class Rod:
         base = RigidTransform.identity() if base is None else base
         if not isinstance(base, RigidTransform) or not base.single:
             raise InputError("a rod's base is one pose, a scipy.spatial.transform.RigidTransform")
-        if isinstance(sections, FlexibleSection | MagnetSection):
-            raise InputError("a rod takes a list of sections: Rod([section])")
+        if not isinstance(sections, Sequence) or isinstance(sections, str):
+            raise InputError(f"a rod takes a list of sections: Rod([section]), got {type(sections).__name__}")
         for name, value in (
             ("sections", tuple(sections)),
             ("base", base),
@@ -68,6 +68,10 @@ class Rod:
             raise InputError(
                 f"the rod has {len(self.magnets)} magnets, and magnet_fields has {len(self.magnet_fields)} entries"
             )
+        if self.magnet_fields is not None:
+            from magfem.rod.interaction import check_fields
+
+            check_fields(self.magnet_fields)
 
     @property
     def magnets(self) -> tuple[MagnetSection, ...]:
@@ -124,6 +128,11 @@ class Rod:
 
         if outside not in ("raise", "extrapolate"):
             raise InputError(f'outside must be "raise" or "extrapolate", got {outside!r}')
+        positive("rod", "tolerance", tolerance)
+        if type(most_iterations) is not int or most_iterations < 1:
+            raise InputError(f"rod: most_iterations must be a whole number from 1, got {most_iterations!r}")
+        if guess is not None and not isinstance(guess, RodState):
+            raise InputError(f"guess is a RodState that solve returned, got {type(guess).__name__}")
         chain = self.chain
         interaction = None
         if self.magnet_fields is not None:
@@ -154,7 +163,7 @@ class Rod:
             found = find_equilibrium(chain, loads, R, p, start, tolerance, most_iterations, leave_saddles, allowed)
         else:
             found = relax(chain, loads, R, p, start, tolerance, most_iterations)
-        if found.converged and region is not None and not np.all(region.contains(found.factored.acting.points)):
+        if region is not None and not np.all(region.contains(found.factored.acting.points)):
             found = replace(found, outcome="outside")
         if strict and found.outcome == "outside" and region is not None:
             raise OutsideRegionError(
