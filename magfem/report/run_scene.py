@@ -26,7 +26,7 @@ def rods_picture(run: Run) -> Picture:
     reach = max(float(np.linalg.norm(run.steps[k].plant, axis=1).max()) for k in chosen)
     bodies = coil_bodies(run)
     near = [float(np.linalg.norm(centre)) for centre, *_ in bodies]
-    wide = View(*_frame(), half=1.15 * max([reach, *near]) + _COIL_LENGTH)
+    wide = View(*_frame(), half=1.25 * max([reach, *near]) + 1.5 * _COIL_LENGTH)
     close = View(*_frame(), half=1.25 * reach)
     with drawing():
         drawn = figure(4.1, 7.4)

@@ -195,7 +195,7 @@ def _pursue(
 def _planar_condition(now: Steering) -> float:
     """Of the turns about y by the currents: in the plane the controller's other rows are zero, and say nothing."""
     sigma = np.linalg.svd(now.model.jacobian[:, 4, : len(now.currents)], compute_uv=False)
-    return float(sigma[0] / sigma[-1]) if sigma[-1] > 0 else np.inf
+    return float(sigma[0] / sigma[-1]) if sigma[-1] > 1e-300 * sigma[0] else np.inf
 
 
 def _words(ending: Ending) -> str:

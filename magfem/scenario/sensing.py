@@ -12,6 +12,7 @@ from magfem.errors import ConvergenceError
 from magfem.rod.camera_views import fit_centreline_to_views, simulate_views
 from magfem.rod.cameras import Camera
 from magfem.rod.centreline import Centreline
+from magfem.rod.magnet_pose import magnet_poses
 from magfem.rod.state import RodState
 from magfem.typing import Floats, Points
 
@@ -82,9 +83,9 @@ class Cameras:
             if start is None:
                 raise
             fitted = self._fitted(plant, pixels, None)
-        base = plant.rod.base
         middle = plant.arc_lengths[plant.loads.chain.magnet_node]
-        return Seen(fitted.position(middle), fitted.frames(middle, base.rotation), fitted)
+        poses = magnet_poses(fitted, middle, plant.rod.base.rotation)
+        return Seen(poses.positions, poses.rotations.as_matrix(), fitted)
 
     def _fitted(self, plant: RodState, pixels: list[Floats], start: Centreline | None) -> Centreline:
         """The centreline in the pictures; of the plant only what is known of the rod without load is used."""
