@@ -6,8 +6,9 @@ import io
 from typing import Any
 
 import numpy as np
-from matplotlib.animation import FuncAnimation, PillowWriter
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from PIL import Image
 
 from magfem.report.figures.style import GREY, drawing, grid
 from magfem.report.run_pictures import MAGNETS, MILLI, VIEWS, draw_rod
@@ -15,7 +16,7 @@ from magfem.scenario.run import Run
 from magfem.scenario.summary import told_angles
 from magfem.typing import Floats
 
-_FRAMES, _PER_SECOND, _DPI = 100, 12, 72
+_FRAMES, _PER_SECOND, _DPI, _COLOURS = 100, 12, 72, 64
 
 
 def animation(run: Run) -> bytes:
@@ -30,7 +31,7 @@ def animation(run: Run) -> bytes:
         drawn.subplots_adjust(0.08, 0.15, 0.98, 0.91, wspace=0.25)
         limits = {name: _square(VIEWS[name][0].project(lines) * MILLI) for name in names}
 
-        def show(k: int) -> list[Any]:
+        def show(k: int) -> None:
             for axes, name in zip(panels, names, strict=False):
                 seen, across, up = VIEWS[name]
                 axes.clear()
@@ -58,10 +59,14 @@ def animation(run: Run) -> bytes:
             low, high = min(actual.min(), wanted.min()), max(actual.max(), wanted.max())
             last.set(xlim=(0, len(run.steps)), ylim=(low - 4, high + 4), xlabel="step", title="angle of rotation (deg)")
             last.legend(loc="upper left", ncols=2)
-            return []
 
-        moving = FuncAnimation(drawn, show, frames=steps.tolist(), init_func=lambda: [])
-        return _gif(moving)
+        canvas: Any = FigureCanvasAgg(drawn)  # untyped in some releases of Matplotlib
+        pictures = []
+        for k in steps.tolist():
+            show(k)
+            canvas.draw()
+            pictures.append(Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB"))
+    return _gif(pictures)
 
 
 def _square(flat: Floats) -> dict[str, tuple[float, float]]:
@@ -72,22 +77,10 @@ def _square(flat: Floats) -> dict[str, tuple[float, float]]:
     return {"xlim": (x - half, x + half), "ylim": (y - half, y + half)}
 
 
-def _gif(moving: FuncAnimation) -> bytes:
-    """Matplotlib's Pillow writer wants a file; this is one in memory."""
+def _gif(pictures: list[Image.Image]) -> bytes:
+    """The pictures as one file, in colours that they share."""
+    palette = pictures[-1].convert("P", palette=Image.Palette.ADAPTIVE, colors=_COLOURS)
+    first, *others = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
     content = io.BytesIO()
-
-    class Writer(PillowWriter):
-        def finish(self) -> None:
-            first, *others = [frame.convert("P", palette=1, colors=64) for frame in self._frames]
-            first.save(
-                content,
-                format="GIF",
-                save_all=True,
-                append_images=others,
-                duration=int(1000 / self.fps),
-                loop=0,
-                optimize=True,
-            )
-
-    moving.save("animation.gif", writer=Writer(fps=_PER_SECOND))
+    first.save(content, format="GIF", save_all=True, append_images=others, duration=round(1000 / _PER_SECOND), loop=0)
     return content.getvalue()

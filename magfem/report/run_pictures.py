@@ -154,8 +154,8 @@ def forces_picture(run: Run) -> Picture:
         "forces",
         content,
         f"The rod's shape with and without magnetic forces at step {k}.",
-        f"The shape at step {k}, where they differ most ({1e3 * apart[k]:.2g} mm): left with magnetic forces, right as it "
-        "would be at the same currents if the magnets felt torques alone. Dotted: the other one.",
+        f"The shape at step {k}, where they differ most ({1e3 * apart[k]:.2g} mm): left with magnetic forces, right as "
+        "it would be at the same currents if the magnets felt torques alone. Dotted: the other one.",
     )
 
 
@@ -247,5 +247,3 @@ def _finish(drawn: Any, panels: Any, run: Run, columns: int = 3) -> None:
     order = [row * columns + column for column in range(columns) for row in range(rows)]  # legends fill columns first
     order = [k for k in order if k < len(handles)]
     drawn.legend([handles[k] for k in order], [labels[k] for k in order], loc="outside lower center", ncols=columns)
-
-

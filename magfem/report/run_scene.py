@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -31,8 +32,8 @@ def rods_picture(run: Run) -> Picture:
     with drawing():
         drawn = figure(4.1, 7.4)
         panels = drawn.subplots(1, 2)
-        for axes, seen, coils in zip(panels, (wide, close), (True, False), strict=True):
-            image = render(lambda plotter, pv, coils=coils: _fill(plotter, pv, run, chosen, bodies if coils else []), seen)
+        for axes, seen, coils in zip(panels, (wide, close), (bodies, []), strict=True):
+            image = render(partial(_fill, run=run, chosen=chosen, bodies=coils), seen)
             canvas(axes, image, seen)
             axes_cross(axes, seen)
             scale_bar(axes, seen)
@@ -82,7 +83,7 @@ def _known_size(run: Run) -> bool:
     return all(_hull(coil) is not None for coil in run.system.coils)
 
 
-def _fill(plotter: Any, pv: Any, run: Run, chosen: list[int], bodies: list[Any]) -> None:
+def _fill(plotter: Any, pv: Any, *, run: Run, chosen: list[int], bodies: list[Any]) -> None:
     for k in chosen:
         step = run.steps[k]
         last = k == chosen[-1]
@@ -90,7 +91,7 @@ def _fill(plotter: Any, pv: Any, run: Run, chosen: list[int], bodies: list[Any])
     for centre, axis, radius, length in bodies:
         coil = pv.Cylinder(center=tuple(centre), direction=tuple(axis), radius=radius, height=length, resolution=80)
         plotter.add_mesh(coil, color=COPPER, opacity=0.55, ambient=0.4, diffuse=0.6, smooth_shading=False)
-        edges = coil.clean().extract_feature_edges(35, boundary_edges=False, manifold_edges=False, non_manifold_edges=False)
+        edges = coil.clean().extract_feature_edges(35, boundary_edges=False, manifold_edges=False)
         plotter.add_mesh(edges, color="#6B3F1A", line_width=2, lighting=False)
 
 
@@ -123,5 +124,3 @@ def _add_rod(plotter: Any, pv: Any, run: Run, line: Points, axes: Floats, opacit
 
 def _radius(section: FlexibleSection) -> float:
     return section.radius if section.radius is not None else float(np.sqrt(section.section.area / np.pi))
-
-

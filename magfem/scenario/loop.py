@@ -140,9 +140,7 @@ def controller_for(scenario: Scenario, system: CoilSystem, target: Target) -> Co
     )
 
 
-def _pursue(
-    loop: _Loop, controller: Controller, now: Steering, number: int, target: Target
-) -> tuple[Steering, Ending]:
+def _pursue(loop: _Loop, controller: Controller, now: Steering, number: int, target: Target) -> tuple[Steering, Ending]:
     """Steer to one target and hold it there, by another way where one leads nowhere.
 
     Once a target was reached the loop goes on for `hold` steps, in which it answers to noise.

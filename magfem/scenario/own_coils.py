@@ -9,6 +9,8 @@
     name = "left"
     position = ["-75 mm", "0 mm", "0 mm"]     # of the coil's centre
     direction = [1, 0, 0]                     # of its axis
+
+Of a system of the catalogue a recipe states the name alone: system = "bigmag".
 """
 
 from __future__ import annotations

@@ -21,11 +21,11 @@ from magfem.typing import Booleans, Floats, Integers, Points, Vectors
 class Step:
     """One step of the loop: what is in use, what came of it, what was seen, what the controller makes of it.
 
-    off: whether all currents were switched off just before.  currents (c,) A, joints (j,) rad or m.  plant, model: (n, 3) m, the centrelines of plant and model.  actual,
-    predicted: (m, 3) unit vectors, the axes of the plant's and of the model's magnets.  places: (m, 3) m of the
-    plant's.  measured: (m, 3), the axes as seen, unit.  error: rad, the largest that the controller sees.
-    condition: of the Jacobian.  stiffness: the factor of the moduli that the model has taken on.  seconds: that the
-    controller took.
+    off: whether all currents were switched off just before.  currents (c,) A, joints (j,) rad or m.
+    plant, model: (n, 3) m, their centrelines.  actual, predicted: (m, 3) unit vectors, the axes of the plant's and of
+    the model's magnets.  places: (m, 3) m of the plant's.  measured: (m, 3), the axes as seen.  error: rad, the largest
+    that the controller sees.  condition: of the Jacobian.  stiffness: the factor of the moduli that the model has taken
+    on.  seconds: that the controller took.
     """
 
     target: int
@@ -73,8 +73,9 @@ class Ending:
 class Run:
     """A scenario that was run.
 
-    rod: of the plant.  missed: measurements that had to be taken again.  coil: the model that own coils were fitted with.  torque_only: centrelines (steps, n, 3) m and
-    magnets' axes (steps, m, 3) if magnets felt torques alone; NaN where there is no such equilibrium.
+    rod: of the plant.  missed: measurements that had to be taken again.  coil: the model that own coils were fitted
+    with.  torque_only: centrelines (steps, n, 3) m and axes (steps, m, 3) if magnets felt torques alone; NaN where
+    there is no such equilibrium.
     """
 
     scenario: Scenario

@@ -30,6 +30,8 @@
     seed = 3
     current = "8 A"                   # currents up to
     joint = "45 deg"                  # joints up to; 0 when not stated
+
+All but kind, name, system, rod and the targets may be left out.
 """
 
 from __future__ import annotations
@@ -149,7 +151,8 @@ def _direction(one: Table) -> list[float]:
     axis = np.array(three_numbers(one, "axis"))
     if axis[2] != 0 or not 0 < np.linalg.norm(axis) < np.inf:
         raise one.error("axis must be horizontal, such as [0, 1, 0]: +z is turned about it", "axis")
-    direction: list[float] = turned_from_z(axis / np.linalg.norm(axis), np.array(one.quantity("angle", "angle"))).tolist()
+    angle = np.array(one.quantity("angle", "angle"))
+    direction: list[float] = turned_from_z(axis / np.linalg.norm(axis), angle).tolist()
     return direction
 
 

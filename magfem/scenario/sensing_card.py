@@ -13,6 +13,8 @@
     position = ["120 mm", "-300 mm", "0 mm"]
     target = ["0 mm", "0 mm", "0 mm"] # what it looks at; the origin when not stated
     focal_length = 2500               # px
+
+Without this table poses are exact.
 """
 
 from __future__ import annotations

@@ -22,9 +22,7 @@ _TRIES = 100  # random states for every target asked for
 
 @dataclass(frozen=True, eq=False)
 class Target:
-    """directions: (m, 3) unit vectors, where the magnets' axes shall point.  expected: "reached" or "unreachable".
-
-    """
+    """directions: (m, 3) unit vectors, where the magnets' axes shall point.  expected: "reached" or "unreachable"."""
 
     directions: Vectors
     expected: str = REACHED
@@ -71,7 +69,7 @@ def drawn(
             found.append(Target(directions))
     if len(found) < wanted.count:
         raise ConvergenceError(
-            f"{_TRIES * wanted.count} random states gave {len(found)} stable ones of the {wanted.count} targets wanted: "
-            "take weaker currents or a stiffer rod"
+            f"{_TRIES * wanted.count} random states gave only {len(found)} of the {wanted.count} targets wanted: take "
+            "weaker currents or a stiffer rod"
         )
     return tuple(found)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+from typing import Any
 
 import numpy as np
 
@@ -21,7 +22,7 @@ def time_series(run: Run) -> str:
     """
     kinds = {"wanted": run.wanted, **{name: run.stacked(name) for name in ("measured", "predicted", "actual")}}
     names = ["step", "target"]
-    columns: list[Floats] = [np.arange(len(run.steps)), run.target_of_step]
+    columns: list[Any] = [np.arange(len(run.steps)), run.target_of_step]
 
     def add(labels: list[str], values: Floats) -> None:
         names.extend(labels)
