@@ -14,7 +14,8 @@ from magfem.rod.state import RodState
 from magfem.typing import Floats, Points
 
 _FORGET = 0.9  # of what earlier measurements weigh, for each new one
-_LARGEST = log(3.0)  # either way: beyond, it is not the stiffness that is wrong
+_LARGEST = log(2.0)  # either way: beyond, it is not the stiffness that is wrong
+_NEAR = 0.35  # rad and POSITION_SCALE, the largest misfit of a magnet: beyond, the model has another shape
 _LEAST = 1e-6  # rad² of information below which a measurement says nothing
 _EXPLAINED = 0.5  # of the squared misfit: a factor that explains less is not believed
 
@@ -50,7 +51,7 @@ def updated(
     slope = np.concatenate([shift, turn]).ravel()
     misfit = np.concatenate([(positions - model.magnet_positions) / POSITION_SCALE, axes - frames]).ravel()
     information = float(slope @ slope)
-    if information < _LEAST:
+    if information < _LEAST or np.abs(misfit).max() > _NEAR:
         return before
     step = float(slope @ misfit) / information
     unexplained = misfit - step * slope

@@ -11,12 +11,16 @@ BASE = RigidTransform.from_components([-0.03, 0, 0], Rotation.from_euler("y", 90
 
 
 def two_magnets(stiffness: float = 1.0, elements: int | None = None) -> Rod:
-    """Flexible, magnet, flexible, magnet; axis along +x; polyurethane of 5.5 MPa times `stiffness`."""
+    """Flexible, magnet, flexible, magnet; axis along +x; polyurethane of 5.5 MPa times `stiffness`.
+
+    The magnets point against each other: a uniform field bends the rod into an S, a gradient into an arc, and the
+    field's forces on them nearly cancel.
+    """
     flexible = FlexibleSection(
-        length=25e-3, radius=1.75e-3, youngs_modulus=5.5e6 * stiffness, density=1040, elements=elements
+        length=25e-3, radius=1.5e-3, youngs_modulus=5.5e6 * stiffness, density=1040, elements=elements
     )
-    magnet = MagnetSection(length=2.5e-3, moment=0.019, mass=1.3e-4)
-    return Rod([flexible, magnet, flexible, magnet], BASE)
+    inner, outer = (MagnetSection(length=4e-3, moment=moment, mass=1.47e-4) for moment in (-0.021, 0.021))
+    return Rod([flexible, inner, flexible, outer], BASE)
 
 
 def stable_targets(system, plant, count: int, seed: int, planar: bool = False):
