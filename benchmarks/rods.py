@@ -1,5 +1,7 @@
 """Rods next to other ways to their shapes: `python benchmarks/rods.py [python-with-pyelastica]`.
 
+`python benchmarks/rods.py figure` draws docs/figures/rods.png instead.
+
 The process keeps to one core; what is compared takes turns. The first table is the dissertation's manipulator in BigMag
 at random currents: this package cold, warm after steps of at most 0.4 A, and with its Jacobian; the same Cosserat
 equations by scipy's `solve_bvp`, and by single shooting as in the dissertation (explicit Runge–Kutta steps of order
@@ -29,6 +31,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from tables import alternate, show
 
 import magfem
+from magfem.fields import UniformField
 from magfem.rod import FlexibleSection, MagnetSection, Rod
 
 LENGTHS, RADIUS, E, DENSITY, MOMENT, MASS = (0.035, 0.03), 1.5e-3, 5.5e6, 1040.0, 0.0135, 1e-4
@@ -281,9 +284,48 @@ def elastica_table(python: str | None) -> None:
     show("Elastica, PL²/EI = 2, 70 mm", ["way", "ms", "over magfem", "tip off by, µm"], rows)
 
 
+def figure() -> None:
+    """docs/figures/rods.png."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    picture = plt.figure(figsize=(9.0, 3.8), dpi=130)
+    axes = picture.add_subplot(1, 2, 1)
+    soft = FlexibleSection(length=1.0, radius=1e-4, youngs_modulus=1e9, magnetic_moment_per_length=(0, 0, 1.0))
+    published = {0.1: 2.862, 0.5: 14.011, 1: 26.434, 2: 44.791, 5: 69.635, 10: 81.949}  # Wang et al. 2020
+    for load, angle in published.items():
+        field = UniformField([load * soft.stiffness[0], 0, 0])
+        state = Rod([soft]).solve(field, gravity=(0, 0, 0))
+        x, z = state.positions[:, 0], state.positions[:, 2]
+        (line,) = axes.plot(x, z, label=f"λ = {load:g}: {np.degrees(np.arccos(state.frames[-1][2, 2])):.3f}°")
+        way = np.array([np.sin(np.radians(angle)), np.cos(np.radians(angle))])
+        axes.plot([x[-1], x[-1] + 0.12 * way[0]], [z[-1], z[-1] + 0.12 * way[1]], ":", color=line.get_color())
+    axes.set(xlabel="x/L, along the field", ylabel="z/L", aspect="equal", title="hard-magnetic; dotted: published")
+    axes.legend(fontsize=7)
+
+    space = picture.add_subplot(1, 2, 2, projection="3d")
+    system, rod = magfem.load_system("bigmag_extended"), manipulator()
+    rng = np.random.default_rng(3)
+    for _ in range(6):
+        state = rod.solve((system, rng.uniform(-4, 4, 14), None))
+        line = space.plot(*(1e3 * state.positions.T), linewidth=1)[0]
+        for node in rod.chain.magnet_node:
+            ends = 1e3 * state.positions[[node - 1, node + 1]]
+            space.plot(*ends.T, color=line.get_color(), linewidth=5, solid_capstyle="butt")
+    space.set(xlabel="x, mm", ylabel="y, mm", zlabel="z, mm", title="two magnets, 14 coils")
+    space.set_box_aspect(None, zoom=0.85)
+    picture.tight_layout()
+    picture.savefig(Path(__file__).parents[1] / "docs" / "figures" / "rods.png", dpi=110, metadata={"Software": None})
+
+
 def main() -> None:
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
+    if sys.argv[1:] == ["figure"]:
+        figure()
+        return
     started = perf_counter()
     manipulator_table()
     elastica_table(sys.argv[1] if len(sys.argv) > 1 else None)

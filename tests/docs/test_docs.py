@@ -106,6 +106,21 @@ EXPECTED = {
         ("scale['factor']", 1.22 / 1.42, 0.02),  # the mean of what 6.1.2's readings imply
         ("B_deviation.max() < 1e-4", True, 0),
     ],
+    "rods.md": [
+        ("state.stable and np.abs(state.internal_force[-1]).max()", 0.0, 0),  # nothing acts on the tip
+        ("np.degrees(np.arccos(hook.frames[-1][2, 2]))", np.degrees(0.5), 1e-9),
+        (
+            "np.abs(J[1, :3, 2] - (more.magnet_positions[1] - bent.magnet_positions[1]) / 0.01).max()"
+            " < 0.01 * np.abs(J[1, :3, 2]).max()",
+            True,
+            0,
+        ),
+        ("straight.unstable_directions + buckled.unstable_directions", 2, 0),
+        # For small loads E and load scale alike: the weight's, field's and both sections' shares of the shape balance.
+        ("softer.positions.shape[1:] == (3, 2) and turn.shape == (3, 6)", True, 0),
+        ("np.abs(force.sum(axis=0)).max() / np.abs(force).max()", 0.0, 1e-9),
+        ("np.degrees(np.arccos(across.frames[-1][2, 2]))", 69.63546369, 1e-3),
+    ],
     "exchange.md": [
         ("(B - block.getB((0, 0, 4e-3)))[2]", 0.973 * RIGID, 5e-3),
         ("gradient[2, 2] / (theirs.B([0, 0, 4.001e-3]) - theirs.B([0, 0, 3.999e-3]))[2] * 2e-6", 1.0, 1e-6),
