@@ -9,7 +9,7 @@ import numpy as np
 
 from magfem.errors import InputError
 from magfem.fields.field import Field
-from magfem.fields.region import Region
+from magfem.fields.region import Everywhere, Region
 from magfem.typing import ArrayLike, Floats, Jet, Points
 
 if TYPE_CHECKING:
@@ -36,8 +36,8 @@ class StaticField:
 
     @property
     def region(self) -> Region:
-        """Where the field holds."""
-        return self.field.region
+        """Where the field holds; everywhere when it does not say."""
+        return getattr(self.field, "region", None) or Everywhere()
 
     def jets(self, points: Points) -> Jet:
         """As `AppliedField.jets`."""
@@ -97,11 +97,11 @@ def applied_field(field: Field | Driven | None) -> AppliedField | None:
         if amperes.ndim != 1:
             raise InputError(f"a rod takes one set of currents, shape ({len(system.coils)},), got {amperes.shape}")
         return DrivenField(system, amperes, system.checked_joints(joints))
-    if not isinstance(field, Field):
+    if not callable(getattr(field, "jet", None)):
         raise InputError(
             f"a rod's field is a Field or (system, currents, joints), got {type(field).__name__}: "
             "magfem.load_model, system.at(currents) and magfem.fields.UniformField give fields"
         )
-    if field.unit != "T":
+    if getattr(field, "unit", "T") != "T":
         raise InputError("a rod's field is in T: multiply a field per ampere by its current in A")
     return StaticField(field)

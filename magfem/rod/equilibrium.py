@@ -26,6 +26,7 @@ _LARGEST_TURN = 1.0  # rad, of any cross-section in one step
 _LARGEST_PREDICTED = 0.3  # rad, of any cross-section
 _ROUNDING = 1e-11  # of the energy: smaller changes say nothing
 _ESCAPES = 8
+_SETTLED = 1e-2  # of the tolerance: a step that turns and shifts by less has nothing to mend
 _AT_HAND = 1e-2  # rad, of any cross-section
 _SLOW = 30  # damped steps after which the lowest eigenvector is tried
 _BLOCKED = 12  # steps in a row that the edge of what is allowed has shortened
@@ -117,6 +118,9 @@ def find_equilibrium(
             damping = max(4 * damping, 1e-3)
             continue
         turn = float(np.abs(moved[:, :3]).max())
+        shift = float(np.abs(moved[:, 3:]).max()) / chain.arc_length[-1]
+        if not damping and max(turn, shift) <= _SETTLED * tolerance:  # all that is left of the residual is rounding
+            return Equilibrium(system, iterations, "unstable" if system.unstable_directions else "stable")
         length = min(1.0, _LARGEST_TURN / turn) if turn > 0 else 1.0
         found, met_the_edge = _search(here, step, slope, length, at, system, allowed)
         blocked = blocked + 1 if met_the_edge else 0

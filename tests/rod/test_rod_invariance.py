@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import RigidTransform, Rotation
 
@@ -65,6 +65,8 @@ def test_rods_of_any_size_and_stiffness_bend_alike(size, stiff, load):
 @settings(max_examples=15, deadline=None)
 @given(load=vectors, cut=st.sampled_from([0.25, 0.5, 0.75]))
 def test_cutting_a_section_in_two_changes_nothing(load, cut):
+    assume(np.hypot(*load[:2]) > 1e-2)  # along the axis alone, nothing tells which way to buckle
+
     def section(length, elements):
         return FlexibleSection(length=length, radius=1e-3, youngs_modulus=3e6, density=900.0, elements=elements)
 
