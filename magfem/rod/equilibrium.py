@@ -100,7 +100,7 @@ def find_equilibrium(
         if iterations == most_iterations:
             return Equilibrium(system, iterations, "iterations")
         iterations += 1
-        if system.chain_negative and not damping:
+        if system.negative and not damping:
             closer = _towards_saddle(system, loads, R_base, p_base)
             if closer is not None:
                 here = at(closer)
@@ -109,7 +109,7 @@ def find_equilibrium(
             here = _leave_saddle(chain, here, loads, at, iterations)
             damping = 0.0
             continue
-        if system.chain_negative:
+        if system.negative:
             damping = max(4 * damping, 1e-3) if damping else NEUTRAL
             continue
         step, moved = system.step(-system.gradient)
@@ -186,7 +186,7 @@ def _leave_saddle(chain: Chain, here: _Point, loads: Loads, at: Callable[[Floats
     damping = 1e-3
     while True:
         system = factored(chain, here.shape, here.acting, loads.coupled, damping)
-        if system.chain_negative == 0 and system.negative == 0:
+        if system.negative == 0:
             break
         damping *= 2
     z = np.random.default_rng(attempt).normal(size=here.shape.twist.shape)

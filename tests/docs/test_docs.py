@@ -44,6 +44,19 @@ EXPECTED = {
     "coil-systems.md": [
         ("abs(rows[:, :3] @ currents - B).max() / abs(B).max()", 0.0, 1e-12),
         ("abs(field.B(points) - B).max() / abs(B).max()", 0.0, 1e-12),
+        ("abs(standing.B(points, currents) - turned).max() / abs(turned).max()", 0.0, 1e-12),
+        (  # a coil of the air kind, 80 mm along its axis; after a quarter turn it lies at (10, −80) mm
+            "gantry.B([0.01, 0, 0], [1.0], [0.01, np.pi / 2])[1] / sum(f * a / 0.08**n for n, f, a in ("
+            "(3, 2, 6.422646756191394e-07), (4, -6, 1.870831551827318e-08), (5, 24, 1.7460902399025802e-10), "
+            "(6, -120, 5.183775351972603e-13)))",
+            1.0,
+            1e-12,
+        ),
+        ("found.torque @ pose.rotation.apply(moment) / np.linalg.norm(found.torque)", 0.0, 1e-12),
+        ("least.met and even.met and even.peak < least.peak and least.norm < even.norm", True, 0),
+        ("abs(along.conditioning.lost[0, 0]) * (along.outcome == 'impossible')", 1.0, 1e-9),
+        ("planned.met and planned.norm <= find_currents(bigmag, magnet, angles).norm", True, 0),
+        ("np.all(reach.field_everywhere <= reach.field_best) and reach.field_best.max() < 8 * 6 * 3e-3", True, 0),
         # Published: B_x = Σ a_k (−1)^{k+1} (k+1)!/x^{k+2} on the axis of the air-cored coil; both point the same way.
         (
             "pair.B([0, 0, 0], [1, -1])[0] / (2 * sum(f * a / 0.08**n for n, f, a in ("
@@ -105,6 +118,20 @@ EXPECTED = {
         ),
         ("scale['factor']", 1.22 / 1.42, 0.02),  # the mean of what 6.1.2's readings imply
         ("B_deviation.max() < 1e-4", True, 0),
+    ],
+    "rods.md": [
+        ("state.stable and np.abs(state.internal_force[-1]).max()", 0.0, 0),  # nothing acts on the tip
+        ("np.degrees(np.arccos(hook.frames[-1][2, 2]))", np.degrees(0.5), 1e-9),
+        (
+            "np.abs(J[1, :3, 2] - (more.magnet_positions[1] - bent.magnet_positions[1]) / 0.01).max()"
+            " < 0.01 * np.abs(J[1, :3, 2]).max()",
+            True,
+            0,
+        ),
+        ("straight.unstable_directions + buckled.unstable_directions", 2, 0),
+        ("np.abs(turn[:, 5] - [0, 0, 1]).max()", 0.0, 1e-9),  # about gravity and field, all turns together
+        ("np.abs(force.sum(axis=0)).max() / np.abs(force).max()", 0.0, 1e-9),
+        ("np.degrees(np.arccos(across.frames[-1][2, 2]))", 69.63546369, 1e-3),
     ],
     "exchange.md": [
         ("(B - block.getB((0, 0, 4e-3)))[2]", 0.973 * RIGID, 5e-3),

@@ -8,7 +8,7 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import RigidTransform, Rotation
 
 import magfem
-from magfem.errors import InputError
+from magfem.errors import ConvergenceError, InputError
 from magfem.fields import DipoleField, UniformField
 from magfem.rod import FlexibleSection, MagnetSection, Rod
 from magfem.rod.interaction import interaction_of
@@ -179,3 +179,21 @@ def test_a_field_for_every_magnet():
     with pytest.raises(InputError, match="2 magnets, and magnet_fields has 1"):
         magnet = MagnetSection(length=4e-3, moment=0.02)
         Rod([soft(), magnet, magnet], magnet_fields=[None])
+
+
+def test_saddles_are_left_with_interaction_too():
+    """Straight and against the field is an equilibrium of these magnets, and not where a cold start ends."""
+    magnet = MagnetSection(length=4e-3, moment=0.02)
+    rod = Rod([soft(), magnet, soft(), magnet], magnet_fields=[None, None])
+    against = UniformField([0, 0, -4e-3])
+    straight = rod.solve(field=against, leave_saddles=False, **WEIGHTLESS)
+    assert straight.outcome == "unstable" and straight.unstable_directions >= 2
+    bent = rod.solve(field=against, **WEIGHTLESS)
+    assert bent.stable and bent.energy < straight.energy and bent.magnet_frames[1, 2, 2] < 0.5
+
+
+def test_magnets_that_fall_into_each_other_have_no_shape():
+    """The energy of two dipoles has no lower bound; where the rod cannot keep them apart there is no equilibrium."""
+    between, magnet = soft(length=6e-3, radius=0.5e-3), MagnetSection(length=3e-3, moment=0.02)
+    with pytest.raises(ConvergenceError, match="did not converge"):
+        Rod([between, magnet, between, magnet], magnet_fields=[None, None]).solve(**WEIGHTLESS)
