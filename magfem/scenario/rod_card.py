@@ -16,7 +16,8 @@
     radius = "1.75 mm"                # a tube with inner_radius
 
     [[rod.sections]]
-    magnet = "disc_magnet_3x2.5"      # a magnet's card: moment, volume, length; its z along the rod
+    magnet = "cylinder_magnet_2.5x4"  # a magnet's card: moment, volume, length; its z along the rod
+    reversed = true                   # its z against the rod; false when not stated
     density = "7500 kg/m^3"           # 7500 kg/m³ when not stated
     model = "my_magnet.json"          # of the magnet, whose moment is taken: weaker than remanence times volume
 
@@ -24,6 +25,8 @@ Instead of a card a magnet may state its `moment` along the rod, `length` and `m
 """
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
@@ -35,6 +38,7 @@ from magfem.geometry.card import Table
 from magfem.geometry.vectors import three_lengths, three_numbers
 from magfem.rod import FlexibleSection, MagnetSection, Rod
 from magfem.rod.magnet_card import NEODYMIUM, magnet_section
+from magfem.scenario.plain_values import switch, whole_number
 
 _KINDS = ("material", "magnet", "moment")
 
@@ -47,9 +51,7 @@ def read_rod(card: Table) -> Rod:
     sections = [_section(entry, materials) for entry in table.tables("sections")]
     position = np.array(three_lengths(table, "position")) if "position" in table else np.zeros(3)
     base = RigidTransform.from_components(position, _turn(table))
-    interacting = table.value("interacting") if "interacting" in table else False
-    if not isinstance(interacting, bool):
-        raise table.error("interacting must be true or false", "interacting")
+    interacting = switch(table, "interacting")
     magnets = sum(isinstance(one, MagnetSection) for one in sections)
     if not magnets:
         raise table.error("a rod that is steered needs at least one magnet among its sections", "sections")
@@ -91,9 +93,7 @@ def _flexible(entry: Table, materials: Table | None) -> FlexibleSection:
     material.only("youngs_modulus", "poisson_ratio", "shear_modulus", "density")
     if "shear_modulus" in material and "poisson_ratio" in material:
         raise material.error("state poisson_ratio or shear_modulus, not both", "shear_modulus")
-    elements = entry.value("elements") if "elements" in entry else None
-    if elements is not None and (isinstance(elements, bool) or not isinstance(elements, int)):
-        raise entry.error("elements must be a whole number", "elements")
+    elements = whole_number(entry, "elements", 0, 2, 4096) if "elements" in entry else None
     return FlexibleSection(
         length=entry.quantity("length", "length"),
         radius=entry.quantity("radius", "length"),
@@ -107,9 +107,7 @@ def _flexible(entry: Table, materials: Table | None) -> FlexibleSection:
 
 
 def _magnet(entry: Table, kind: str) -> MagnetSection:
-    points = entry.value("field_points") if "field_points" in entry else 1
-    if isinstance(points, bool) or not isinstance(points, int):
-        raise entry.error("field_points must be a whole number", "field_points")
+    points = whole_number(entry, "field_points", 1, 1, 16)
     if kind == "moment":
         entry.only("moment", "length", "mass", "field_points")
         return MagnetSection(
@@ -118,9 +116,14 @@ def _magnet(entry: Table, kind: str) -> MagnetSection:
             mass=entry.quantity("mass", "mass"),
             field_points=points,
         )
-    entry.only("magnet", "model", "density", "field_points")
+    entry.only("magnet", "reversed", "model", "density", "field_points")
+    backwards = switch(entry, "reversed")
     model = load_model(entry.text("model")) if "model" in entry else None
     if model is not None and model.unit != "T":
         raise entry.error("this model is a coil's, and a rod carries magnets", "model")
     density = entry.quantity("density", "density") if "density" in entry else NEODYMIUM
-    return magnet_section(entry.text("magnet"), density=density, model=model, field_points=points)
+    found = magnet_section(entry.text("magnet"), density=density, model=model, field_points=points)
+    if not backwards:
+        return found
+    x, y, z = found.moment_vector.tolist()  # turned by 180 deg about its y axis
+    return replace(found, moment=(-x, y, -z))

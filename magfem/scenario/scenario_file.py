@@ -47,11 +47,11 @@ from magfem.geometry.vectors import three_numbers
 from magfem.rod import Rod
 from magfem.scenario.angles import turned_from_z
 from magfem.scenario.own_coils import OwnCoils, read_own_coils
+from magfem.scenario.plain_values import switch, whole_number
 from magfem.scenario.rod_card import read_rod
 from magfem.scenario.scenario import PREVIOUS, STRAIGHT, Scenario
 from magfem.scenario.sensing_card import read_sensing
 from magfem.scenario.targets import REACHED, UNREACHABLE, RandomTargets, Target
-from magfem.scenario.whole_numbers import whole_number
 from magfem.units import describe, quantity
 
 KIND = "scenario"
@@ -86,7 +86,7 @@ def read_scenario(card: Table) -> Scenario:
         *("kind", "name", "source", "system", "planar", "compare_forces", "hold", "most_steps", "plans", "start"),
         *("gravity", "rod", "materials", "plant", "sensing", "controller", "targets", "random"),
     )
-    planar = _switch(card, "planar")
+    planar = switch(card, "planar")
     rod = read_rod(card)
     sensing, seed = read_sensing(card)
     start = card.text("start") if "start" in card else STRAIGHT if "random" in card else PREVIOUS
@@ -109,7 +109,7 @@ def read_scenario(card: Table) -> Scenario:
         most_steps=whole_number(card, "most_steps", 400, 1),
         plans=whole_number(card, "plans", 3, 0),
         seed=seed,
-        compare_forces=_switch(card, "compare_forces"),
+        compare_forces=switch(card, "compare_forces"),
     )
 
 
@@ -209,10 +209,3 @@ def _gravity(card: Table) -> tuple[float, float, float]:
     except InputError as error:
         raise card.error(str(error), "gravity") from None
     return x, y, z
-
-
-def _switch(card: Table, key: str) -> bool:
-    value = card.value(key) if key in card else False
-    if not isinstance(value, bool):
-        raise card.error(f"{key} must be true or false, got {describe(value)}", key)
-    return value

@@ -23,8 +23,8 @@ from magfem.errors import CardError, InputError
 from magfem.geometry.card import Table
 from magfem.geometry.vectors import three_lengths
 from magfem.rod.cameras import Camera
+from magfem.scenario.plain_values import whole_number
 from magfem.scenario.sensing import Cameras, Exact, Sensing
-from magfem.scenario.whole_numbers import whole_number
 from magfem.units import describe
 
 
