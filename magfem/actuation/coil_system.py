@@ -13,6 +13,8 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from magfem.actuation.joints import Joint, Joints
 from magfem.actuation.moving_coils import MovingCoils
+from magfem.actuation.wrench import dipole_wrench
+from magfem.actuation.wrench_map import WrenchMap, magnets, wrench_map
 from magfem.errors import InputError
 from magfem.fields.field import OUTSIDE, Evaluated, Unit, as_points, promised_points
 from magfem.fields.region import Everywhere, Intersection, PlacedRegion, Region
@@ -246,6 +248,33 @@ class CoilSystem:
                     numbers = jets.reshape(*jets.shape[:2], -1)
                     part[block] = np.einsum("ng,gna->na", weights[block], numbers)
         return [part.reshape(lead + (3,) * rank) for rank, part in enumerate(total, start=1)]
+
+    def wrench(
+        self,
+        moment: ArrayLike,
+        pose: RigidTransform,
+        currents: ArrayLike,
+        joints: ArrayLike | None = None,
+        outside: Outside = "raise",
+    ) -> tuple[Vectors, Vectors]:
+        """(force, torque), (..., 3) N and N·m, on magnets of dipole moment (..., 3) A·m² in their own frame.
+
+        pose: of the magnet's frame in the system's, one or as many as there are moments. The torque is about the
+        magnet's origin, both are in the system's axes. Raises as `jet` does, and InputError for what is no pose.
+        """
+        own, places, _ = magnets(moment, pose)
+        return dipole_wrench(own, *self.jet(places, currents, joints, 1, outside))
+
+    def wrench_map(
+        self,
+        moment: ArrayLike,
+        pose: RigidTransform,
+        currents: ArrayLike,
+        joints: ArrayLike | None = None,
+        outside: Outside = "raise",
+    ) -> WrenchMap:
+        """As `wrench`, for currents (c,), with the 6 × c map from currents and all other derivatives."""
+        return wrench_map(self, moment, pose, currents, joints, outside)
 
     def at(self, currents: ArrayLike, joints: ArrayLike | None = None) -> SystemField:
         """The field of the currents (c,) A at these joint values: a Field in T, evaluated in one call."""

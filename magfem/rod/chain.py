@@ -24,10 +24,11 @@ class Chain:
     """Links from the base to the tip, e of them between e + 1 nodes; d dipoles of m magnets.
 
     flexible, length, stiffness, rest: of links, as `chain_kernel.shape` takes them.  section: (e,) which section a link
-    is of.  arc_length: (e + 1,) m.  weight: (e + 1,) kg carried by a node.  axial_weight: (e + 1,) kg·m, of the couples
-    (R ẑ) × g that complete the trapezoid rule for a section's weight.  force, couple: (e + 1, 3) the same of forces per
-    length.  torque: (e + 1, 3) N·m of moments per length.  dipole_node, dipole_offset, dipole_moment: (d,), (d, 3),
-    (d, 3) in the node's axes.  dipole_magnet: (d,), the magnet it is of, or −1.  magnet_node: (m,) at their centres.
+    is of.  arc_length: (e + 1,) m.  weight: (e + 1,) kg carried by a node.  end_weight: (e + 1, 3) kg·m in the node's
+    axes, of the couples (R end_weight) × g that complete the trapezoid rule for a section's weight.  force, couple:
+    (e + 1, 3) N and (e + 1, 3, 3) N·m, world by node's axes, the same of forces per length.  torque: (e + 1, 3) N·m of
+    moments per length.  dipole_node, dipole_offset, dipole_moment: (d,), (d, 3), (d, 3) in the node's axes.
+    dipole_magnet: (d,), the magnet it is of, or −1.  magnet_node: (m,) at their centres.
     """
 
     flexible: Booleans
@@ -37,7 +38,7 @@ class Chain:
     section: Integers
     arc_length: Floats
     weight: Floats
-    axial_weight: Floats
+    end_weight: Floats
     force: Floats
     couple: Floats
     torque: Floats
@@ -75,8 +76,8 @@ def chain_of(sections: Sequence[FlexibleSection | MagnetSection]) -> Chain:
     length = np.array([link[1] for link in links])
     section = np.array([link[2] for link in links], dtype=np.int64)
     stiffness, rest = np.zeros((count, 6)), np.zeros((count, 12))
-    weight, axial_weight = np.zeros(count + 1), np.zeros(count + 1)
-    force, couple, torque = np.zeros((count + 1, 3)), np.zeros((count + 1, 3)), np.zeros((count + 1, 3))
+    weight, end_weight, couple = np.zeros(count + 1), np.zeros((count + 1, 3)), np.zeros((count + 1, 3, 3))
+    force, torque = np.zeros((count + 1, 3)), np.zeros((count + 1, 3))
     dipoles: list[tuple[int, Floats, Floats, int]] = []
     magnets: list[int] = []
     begin = 0
@@ -95,9 +96,10 @@ def chain_of(sections: Sequence[FlexibleSection | MagnetSection]) -> Chain:
             force[nodes] += share[:, None] * dead
             torque[nodes] += share[:, None] * turning
             # ∫ p ds = trapezoid + h²/12 (p′(0) − p′(L)): the couples that make nodal forces right to order four.
+            along = h * h / 12 * np.asarray(one.intrinsic_strain, float)
             for node, sign in ((begin, 1.0), (end, -1.0)):
-                axial_weight[node] += sign * h * h / 12 * mass
-                couple[node] += sign * h * h / 12 * dead
+                end_weight[node] += sign * mass * along
+                couple[node] += sign * np.outer(dead, along)
             magnetic = np.asarray(one.magnetic_moment_per_length, float)
             if magnetic.any():
                 dipoles += [(begin + n, np.zeros(3), part * magnetic, -1) for n, part in enumerate(share)]
@@ -121,7 +123,7 @@ def chain_of(sections: Sequence[FlexibleSection | MagnetSection]) -> Chain:
         section=section,
         arc_length=np.concatenate([[0.0], np.cumsum(length)]),
         weight=weight,
-        axial_weight=axial_weight,
+        end_weight=end_weight,
         force=force,
         couple=couple,
         torque=torque,

@@ -26,6 +26,8 @@ from magfem.typing import Booleans, Floats
 NEUTRAL = 1e-9
 """Of a link's bending stiffness: pivots below count as zero, such as that of a turn which no load resists."""
 
+_ROUNDING = 1e-15  # of its shear stiffness at the arm of its length: what rounding leaves of a pivot of zero
+
 _TERMS = 12  # of the series in θ²: exact to rounding for links that turn by less than π
 _C1 = np.array([(-1.0) ** k / float(np.prod(np.arange(1.0, 2 * k + 3))) for k in range(_TERMS)])  # (1 − cos θ)/θ²
 _C2 = np.array([(-1.0) ** k / float(np.prod(np.arange(1.0, 2 * k + 4))) for k in range(_TERMS)])  # (θ − sin θ)/θ³
@@ -399,7 +401,8 @@ def factor(
                 Lk[i, i] += OWN * damped
                 Lk[6 + i, 6 + i] += OWN * damped
                 Lk[6 + i, i] += CROSS * damped
-            negative += _eliminate(Lk, mk, Kk, NEUTRAL * stiffness[k, :3].max() / length[k])
+            neutral = NEUTRAL * stiffness[k, :3].max() / length[k] + _ROUNDING * stiffness[k, 3] * length[k]
+            negative += _eliminate(Lk, mk, Kk, neutral)
             for i in range(6):
                 for j in range(i + 1):
                     total = 0.0
@@ -422,17 +425,17 @@ def factor(
 def _eliminate(L: Floats, mixed: Floats, gain: Floats, neutral: float) -> int:
     """Factor the lower half of L (12, 12) in place, L D Lᵀ, the diagonal as 1/D; gain = −(L D Lᵀ)⁻¹ mixedᵀ.
 
-    Returns how many pivots are below −`neutral`. A pivot of exactly zero becomes tiny: the step is then huge, and
-    refused.
+    Returns how many pivots are below −`neutral`. One that is smaller becomes `neutral`: divided by what rounding left
+    of a zero, the pivots after it would say nothing.
     """
     negative = 0
     column = np.empty(12)
     for j in range(12):
         pivot = L[j, j]
-        if pivot == 0.0:
-            pivot = 1e-300
         if pivot < -neutral:
             negative += 1
+        elif pivot < neutral:
+            pivot = neutral
         inverse = 1.0 / pivot
         L[j, j] = inverse
         for i in range(j + 1, 12):

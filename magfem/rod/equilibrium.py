@@ -15,7 +15,7 @@ import numpy as np
 
 from magfem.rod import chain_kernel
 from magfem.rod.chain import Chain
-from magfem.rod.factored import Factored, Shape, factored, shape_of
+from magfem.rod.factored import NEUTRAL, Factored, Shape, factored, shape_of
 from magfem.rod.loads import Acting, Loads
 from magfem.typing import Floats, Points
 
@@ -26,6 +26,9 @@ _LARGEST_TURN = 1.0  # rad, of any cross-section in one step
 _LARGEST_PREDICTED = 0.3  # rad, of any cross-section
 _ROUNDING = 1e-11  # of the energy: smaller changes say nothing
 _ESCAPES = 8
+_SETTLED = 1e-2  # of the tolerance: a step that turns and shifts by less has nothing to mend
+_AT_HAND = 1e-2  # rad, of any cross-section
+_SLOW = 30  # damped steps after which the lowest eigenvector is tried
 _BLOCKED = 12  # steps in a row that the edge of what is allowed has shortened
 
 
@@ -82,20 +85,32 @@ def find_equilibrium(
     damping, iterations, escapes, blocked = 0.0, 0, 0, 0
     while True:
         system = factored(chain, here.shape, here.acting, loads.coupled, damping)
+        if not np.isfinite(system.residual):
+            return Equilibrium(system, iterations, "stalled")
         if system.residual <= tolerance:
             if damping:
                 system = factored(chain, here.shape, here.acting, loads.coupled)
                 damping = 0.0
-            if system.negative == 0 or not leave_saddles or escapes == _ESCAPES:
-                return Equilibrium(system, iterations, "unstable" if system.negative else "stable")
+            unstable = system.unstable_directions
+            if not unstable or not leave_saddles or escapes == _ESCAPES:
+                return Equilibrium(system, iterations, "unstable" if unstable else "stable")
             escapes += 1
             here = _leave_saddle(chain, here, loads, at, escapes)
             continue
         if iterations == most_iterations:
             return Equilibrium(system, iterations, "iterations")
         iterations += 1
+        if system.chain_negative and not damping:
+            closer = _towards_saddle(system, loads, R_base, p_base)
+            if closer is not None:
+                here = at(closer)
+                continue
+        if leave_saddles and damping and iterations % _SLOW == 0:
+            here = _leave_saddle(chain, here, loads, at, iterations)
+            damping = 0.0
+            continue
         if system.chain_negative:
-            damping = max(4 * damping, 1e-3)
+            damping = max(4 * damping, 1e-3) if damping else NEUTRAL
             continue
         step, moved = system.step(-system.gradient)
         slope = float(np.vdot(system.gradient, step))
@@ -103,6 +118,9 @@ def find_equilibrium(
             damping = max(4 * damping, 1e-3)
             continue
         turn = float(np.abs(moved[:, :3]).max())
+        shift = float(np.abs(moved[:, 3:]).max()) / chain.arc_length[-1]
+        if not damping and max(turn, shift) <= _SETTLED * tolerance:  # all that is left of the residual is rounding
+            return Equilibrium(system, iterations, "unstable" if system.unstable_directions else "stable")
         length = min(1.0, _LARGEST_TURN / turn) if turn > 0 else 1.0
         found, met_the_edge = _search(here, step, slope, length, at, system, allowed)
         blocked = blocked + 1 if met_the_edge else 0
@@ -117,6 +135,20 @@ def find_equilibrium(
         damping = damping / 8 if taken == 1.0 else damping if taken > 0.2 else max(4 * damping, 1e-3)
         if damping < 1e-4:
             damping = 0.0
+
+
+def _towards_saddle(system: Factored, loads: Loads, R_base: Floats, p_base: Points) -> Floats | None:
+    """Twists nearer to a saddle that is at hand, such as that of a straight rod pressed along its axis; or None.
+
+    Damping, which a Hessian with negative eigenvalues asks for, would take many small steps there.
+    """
+    step, moved = system.step(-system.gradient)
+    if not np.abs(moved[:, :3]).max() < _AT_HAND:
+        return None
+    twist: Floats = system.shape.twist + step
+    shape = shape_of(system.chain, twist, R_base, p_base)
+    closer = factored(system.chain, shape, loads.act(shape.R, shape.p), loads.coupled)
+    return twist if closer.residual < 0.5 * system.residual else None
 
 
 def _search(
@@ -201,9 +233,11 @@ def relax(
     while True:
         shape = shape_of(chain, twist, R_base, p_base)
         system = factored(chain, shape, loads.act(shape.R, shape.p), loads.coupled, damping)
+        if not np.isfinite(system.residual):
+            return Equilibrium(system, iterations, "stalled")
         if system.residual <= tolerance:
             system = factored(chain, shape, system.acting, loads.coupled)
-            return Equilibrium(system, iterations, "unstable" if system.negative else "stable")
+            return Equilibrium(system, iterations, "unstable" if system.unstable_directions else "stable")
         if iterations == most_iterations:
             return Equilibrium(system, iterations, "iterations")
         iterations += 1

@@ -13,6 +13,9 @@ from magfem.rod.chain import Chain
 from magfem.rod.loads import Acting
 from magfem.typing import Floats, Integers, Points
 
+NEUTRAL = 1e-7
+"""Eigenvalues of less, in units of the elastic Hessian, are those of a turn that no load resists."""
+
 
 @dataclass(frozen=True, eq=False)
 class Shape:
@@ -40,7 +43,7 @@ def shape_of(chain: Chain, twist: Floats, R_base: Floats, p_base: Points) -> Sha
 
 @dataclass(frozen=True, eq=False)
 class Factored:
-    """H = H₀ + GᵀWG: H₀ as the chain factors it, W the remainder of the coupled nodes, G what they do.
+    """H = H₀ + GᵀWG: H₀ as the chain factors it, W the remainder of the coupled coordinates, G what they do.
 
     gradient: (e, 12) of the energy, or minus the unbalanced loads.  resultant: (e + 1, 6) moment, force that the loads
     from a node on exert about it.  chain_negative: negative eigenvalues of H₀ with its damping.
@@ -102,8 +105,7 @@ class Factored:
         if self.acting.remainder is None:
             return twist, x
         unit_twist, unit_x, _ = self._unit_answers
-        n, size = x.shape[2], len(self.acting.remainder)
-        moved = x[self.coupled].reshape(size, n)
+        moved = x.reshape(-1, x.shape[2])[self.coupled]
         extra = np.linalg.solve(self._with_remainder, self.acting.remainder @ moved)
         return twist - unit_twist @ extra, x - unit_x @ extra
 
@@ -133,13 +135,12 @@ class Factored:
 
     @cached_property
     def _unit_answers(self) -> tuple[Floats, Floats, Floats]:
-        """H₀⁻¹Gᵀ: twists (e, 12, 6k), nodes (e + 1, 6, 6k), and of them the coupled nodes' (6k, 6k)."""
-        size = 6 * self.coupled.size
-        load = np.zeros((self.chain.links + 1, 6, size))
-        for k, node in enumerate(self.coupled):
-            load[node, :, 6 * k : 6 * k + 6] = np.eye(6)
-        twist, x = self._chain_answer(None, load, None)
-        return twist, x, x[self.coupled].reshape(size, size)
+        """H₀⁻¹Gᵀ: twists (e, 12, k), nodes (e + 1, 6, k), and of them the coupled coordinates' (k, k)."""
+        size = self.coupled.size
+        load = np.zeros((6 * (self.chain.links + 1), size))
+        load[self.coupled, np.arange(size)] = 1.0
+        twist, x = self._chain_answer(None, load.reshape(-1, 6, size), None)
+        return twist, x, x.reshape(-1, size)[self.coupled]
 
     @cached_property
     def _with_remainder(self) -> Floats:
@@ -155,12 +156,21 @@ class Factored:
         """
         if self.acting.remainder is None:
             return self.chain_negative
-        W, C = self.acting.remainder, self._unit_answers[2]
-        size = len(W)
+        W = self.acting.remainder
+        if not (W + W.T).any():
+            return self.chain_negative
+        C, size = self._unit_answers[2], len(W)
         scale = np.sqrt(np.maximum(np.abs(np.diag(C)), np.finfo(float).tiny))
         C, W = 0.5 * (C + C.T) / np.outer(scale, scale), 0.5 * (W + W.T) * np.outer(scale, scale)
         small = np.block([[-C, -np.eye(size)], [-np.eye(size), W]])
         return self.chain_negative + int(np.count_nonzero(np.linalg.eigvalsh(small) < -chain_kernel.NEUTRAL)) - size
+
+    @cached_property
+    def unstable_directions(self) -> int:
+        """Eigenvalues below −`NEUTRAL` of the Hessian without damping, in units of the elastic one."""
+        if not self.negative:
+            return 0
+        return factored(self.chain, self.shape, self.acting, self.coupled, NEUTRAL).negative
 
 
 def factored(chain: Chain, shape: Shape, acting: Acting, coupled: Integers, damping: float = 0.0) -> Factored:

@@ -110,10 +110,10 @@ def _slope(count: int, magnet: int, shift: Floats | None = None, turn: Floats | 
 def _direction_error(wanted: Floats, axis: Floats) -> tuple[Floats, Floats]:
     """(2,) and its derivative (2, 3) by a turn of `axis`."""
     d = wanted / np.linalg.norm(wanted)
-    first = np.eye(3)[np.argmin(np.abs(d))]
-    t1 = np.cross(d, first)
-    t1 /= np.linalg.norm(t1)
-    T = np.stack([t1, np.cross(d, t1)])
+    D = _cross(d)
+    t1 = D[:, np.argmin(np.abs(d))]  # d × the axis that is farthest from it
+    t1 = t1 / np.linalg.norm(t1)
+    T = np.stack([t1, D @ t1])
     flat = T @ axis
     cosine, sine = float(d @ axis), float(np.linalg.norm(flat))
     theta = float(np.arctan2(sine, cosine))

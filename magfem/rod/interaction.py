@@ -71,6 +71,14 @@ class Interaction:
         return float(-mu @ B)
 
 
+def check_fields(fields: Sequence[Field | None]) -> None:
+    """Raise InputError unless all are fields in T, or None."""
+    for k, one in enumerate(fields):
+        if one is not None and (not isinstance(one, Field) or one.unit != "T"):
+            got = f"a field in {one.unit}" if isinstance(one, Field) else type(one).__name__
+            raise InputError(f"magnet_fields takes a Field in T or None for every magnet, got {got} as entry {k}")
+
+
 def interaction_of(fields: Sequence[Field | None], moments: Floats) -> Interaction:
     """Of magnets with `fields`; the field of a dipole stands in for None. Raises InputError for a wrong number."""
     from magfem.fields.dipole_field import DipoleField

@@ -52,22 +52,27 @@ def node_loads(
     """
     energy = 0.0
     for n in range(force.shape[0]):
-        z0, z1, z2 = R[n, 0, 2], R[n, 1, 2], R[n, 2, 2]
-        c0, c1, c2 = couple[n, 0], couple[n, 1], couple[n, 2]
-        wrench[n, 0] = z1 * c2 - z2 * c1
-        wrench[n, 1] = z2 * c0 - z0 * c2
-        wrench[n, 2] = z0 * c1 - z1 * c0
-        along = z0 * c0 + z1 * c1 + z2 * c2
-        energy -= along
         for i in range(6):
+            wrench[n, i] = 0.0
             for j in range(6):
                 tangent[n, i, j] = 0.0
         for i in range(3):
             wrench[n, 3 + i] = force[n, i]
             energy -= force[n, i] * p[n, i]
-            for j in range(3):
-                tangent[n, i, j] = -0.5 * (R[n, i, 2] * couple[n, j] + couple[n, i] * R[n, j, 2])
-            tangent[n, i, i] += along
+        for axis in range(3):
+            c0, c1, c2 = couple[n, 0, axis], couple[n, 1, axis], couple[n, 2, axis]
+            if c0 == 0.0 and c1 == 0.0 and c2 == 0.0:
+                continue
+            z0, z1, z2 = R[n, 0, axis], R[n, 1, axis], R[n, 2, axis]
+            wrench[n, 0] += z1 * c2 - z2 * c1
+            wrench[n, 1] += z2 * c0 - z0 * c2
+            wrench[n, 2] += z0 * c1 - z1 * c0
+            along = z0 * c0 + z1 * c1 + z2 * c2
+            energy -= along
+            for i in range(3):
+                for j in range(3):
+                    tangent[n, i, j] -= 0.5 * (R[n, i, axis] * couple[n, j, axis] + couple[n, i, axis] * R[n, j, axis])
+                tangent[n, i, i] += along
     mu, a, f, t, u = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     F, GM, K = np.empty((3, 3)), np.empty((3, 3)), np.empty((6, 6))
     for k in range(node.size):

@@ -21,7 +21,7 @@ class Acting:
     """What the loads do at one shape.
 
     energy: J, of what has a potential.  wrench: (e + 1, 6) torque, force.  tangent: (e + 1, 6, 6), the symmetric part
-    of −∂wrench/∂x, x = (ω, v).  remainder: (6k, 6k) of the nodes `Loads.coupled`, what the tangents lack; None when
+    of −∂wrench/∂x, x = (ω, v).  remainder: (k, k) of the coordinates `Loads.coupled`, what the tangents lack; None when
     there are none.  points: (d, 3) m of the dipoles.  jets: the field there.
     """
 
@@ -58,8 +58,8 @@ class Loads:
 
     @cached_property
     def dead_couple(self) -> Floats:
-        """(e + 1, 3) N·m, of −c·(R ẑ)."""
-        return self.chain.axial_weight[:, None] * self.gravity + self.chain.couple
+        """(e + 1, 3, 3) N·m, of −Σ c_ij R_ij."""
+        return self.gravity[:, None] * self.chain.end_weight[:, None, :] + self.chain.couple
 
     @cached_property
     def conservative(self) -> bool:
@@ -68,15 +68,22 @@ class Loads:
 
     @cached_property
     def coupled(self) -> Integers:
-        """(k,) nodes whose loads the symmetric tangents do not describe."""
-        nodes: set[int] = set()
-        if self.chain.torque.any():
-            nodes |= set(np.flatnonzero(self.chain.torque.any(axis=1)).tolist())
-        if self.tip_moment.any() or (self.follower and self.tip_force.any()):
-            nodes.add(self.chain.links)
+        """(k,) coordinates, 6 · node + component of (ω, v), whose loads the symmetric tangents do not describe.
+
+        Of a node they follow each other: all six, or the first three where torques are all there is.
+        """
+        chain = self.chain
+        turning = set(np.flatnonzero(chain.torque.any(axis=1)).tolist())
+        moving: set[int] = set()
+        if self.follower and self.tip_force.any():
+            moving.add(chain.links)
+        elif self.tip_moment.any():
+            turning.add(chain.links)
         if self.interaction is not None:
-            nodes |= set(self.chain.magnet_node.tolist())
-        return np.array(sorted(nodes), dtype=np.int64)
+            moving |= set(chain.magnet_node.tolist())
+        coordinates = [6 * node + i for node in turning - moving for i in range(3)]
+        coordinates += [6 * node + i for node in moving for i in range(6)]
+        return np.array(sorted(coordinates), dtype=np.int64)
 
     def act(self, R: Floats, p: Points) -> Acting:
         """On nodes of rotations R (e + 1, 3, 3) at p (e + 1, 3)."""
@@ -114,31 +121,34 @@ class Loads:
         A torque τ that does not turn leaves −½ [τ]× of −∂w/∂x beside the symmetric part that the chain takes, one that
         turns with its section +½ [τ]×; a force F that turns [F]×.
         """
-        place = {int(node): k for k, node in enumerate(self.coupled)}
-        W = np.zeros((len(place), 6, len(place), 6))
+        W = np.zeros((self.coupled.size, self.coupled.size))
         energy = 0.0
-        if self.chain.torque.any():
-            for node in np.flatnonzero(self.chain.torque.any(axis=1)).tolist():
-                torque, k = self.chain.torque[node], place[node]
-                wrench[node, :3] += torque
-                W[k, :3, k, :3] -= 0.5 * cross_matrix(torque)
+
+        def turns(node: int) -> slice:
+            first = int(np.searchsorted(self.coupled, 6 * node))
+            return slice(first, first + 3)
+
+        for node in np.flatnonzero(self.chain.torque.any(axis=1)).tolist():
+            wrench[node, :3] += self.chain.torque[node]
+            W[turns(node), turns(node)] -= 0.5 * cross_matrix(self.chain.torque[node])
         tip = self.chain.links
-        if tip in place:
-            k = place[tip]
-            torque = self.tip_moment
-            if self.follower:
-                torque, force = R[-1] @ torque, (R[-1] @ self.tip_force)
+        torque = self.tip_moment
+        if self.follower:
+            torque, force = R[-1] @ torque, R[-1] @ self.tip_force
+            if force.any():
                 wrench[-1, 3:] += force
-                W[k, 3:, k, :3] += cross_matrix(force)
+                first = turns(tip).start
+                W[first + 3 : first + 6, turns(tip)] += cross_matrix(force)
+        if torque.any():
             wrench[-1, :3] += torque
-            W[k, :3, k, :3] += (0.5 if self.follower else -0.5) * cross_matrix(torque)
+            W[turns(tip), turns(tip)] += (0.5 if self.follower else -0.5) * cross_matrix(torque)
         if self.interaction is not None:
             nodes = self.chain.magnet_node
             energy, between, tangent = self.interaction.act(R[nodes], p[nodes])
             wrench[nodes] += between
-            at = [place[int(node)] for node in nodes]
-            W[np.ix_(at, range(6), at, range(6))] += tangent
-        return energy, W.reshape(6 * len(place), 6 * len(place))
+            at = (np.searchsorted(self.coupled, 6 * nodes)[:, None] + np.arange(6)).ravel()
+            W[np.ix_(at, at)] += tangent.reshape(at.size, at.size)
+        return energy, W
 
 
 _NOTHING: Jet = (np.empty((0, 3)), np.empty((0, 3, 3)), np.empty((0, 3, 3, 3)))

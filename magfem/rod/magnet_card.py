@@ -36,7 +36,7 @@ def magnet_section(
 
     geometry = load_geometry(magnet) if isinstance(magnet, str | os.PathLike) else magnet
     if not isinstance(geometry, Magnets):
-        raise InputError(f"a rod's magnet is a permanent magnet, and {geometry.name or geometry.words} is not")
+        raise InputError(f"a rod's magnet is a permanent magnet, and {geometry.name or geometry.kind} is not")
     positive("magnet section", "density", density)
     far = 2 * geometry.hull.radius
     above, below = geometry.hull.distance(np.array([[0.0, 0.0, far], [0.0, 0.0, -far]]))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform
 
 from magfem.errors import ConvergenceError, InputError, OutsideRegionError
-from magfem.rod.sections import FlexibleSection, MagnetSection, three
+from magfem.rod.sections import FlexibleSection, MagnetSection, positive, three
 from magfem.typing import ArrayLike, Floats, Points
 
 if TYPE_CHECKING:
@@ -49,8 +49,8 @@ class Rod:
         base = RigidTransform.identity() if base is None else base
         if not isinstance(base, RigidTransform) or not base.single:
             raise InputError("a rod's base is one pose, a scipy.spatial.transform.RigidTransform")
-        if isinstance(sections, FlexibleSection | MagnetSection):
-            raise InputError("a rod takes a list of sections: Rod([section])")
+        if not isinstance(sections, Sequence) or isinstance(sections, str):
+            raise InputError(f"a rod takes a list of sections: Rod([section]), got {type(sections).__name__}")
         for name, value in (
             ("sections", tuple(sections)),
             ("base", base),
@@ -68,6 +68,10 @@ class Rod:
             raise InputError(
                 f"the rod has {len(self.magnets)} magnets, and magnet_fields has {len(self.magnet_fields)} entries"
             )
+        if self.magnet_fields is not None:
+            from magfem.rod.interaction import check_fields
+
+            check_fields(self.magnet_fields)
 
     @property
     def magnets(self) -> tuple[MagnetSection, ...]:
@@ -124,6 +128,11 @@ class Rod:
 
         if outside not in ("raise", "extrapolate"):
             raise InputError(f'outside must be "raise" or "extrapolate", got {outside!r}')
+        positive("rod", "tolerance", tolerance)
+        if type(most_iterations) is not int or most_iterations < 1:
+            raise InputError(f"rod: most_iterations must be a whole number from 1, got {most_iterations!r}")
+        if guess is not None and not isinstance(guess, RodState):
+            raise InputError(f"guess is a RodState that solve returned, got {type(guess).__name__}")
         chain = self.chain
         interaction = None
         if self.magnet_fields is not None:
@@ -154,26 +163,20 @@ class Rod:
             found = find_equilibrium(chain, loads, R, p, start, tolerance, most_iterations, leave_saddles, allowed)
         else:
             found = relax(chain, loads, R, p, start, tolerance, most_iterations)
-        snapped = guess is not None and expected < np.inf and _snapped(guess, found.factored, expected)
-        state = RodState(self, loads, found, snapped)
+        if region is not None and not np.all(region.contains(found.factored.acting.points)):
+            found = replace(found, outcome="outside")
         if strict and found.outcome == "outside" and region is not None:
             raise OutsideRegionError(
-                f"a magnet is pulled out of the field's region ({region.describe()}) before the rod finds an "
-                "equilibrium; strict=False returns the last shape within"
+                f"a magnet of the rod is pulled out of the field's region ({region.describe()}); strict=False returns "
+                'the last shape, outside="extrapolate" takes the field there as it is'
             )
+        snapped = guess is not None and expected < np.inf and _snapped(guess, found.factored, expected)
+        state = RodState(self, loads, found, snapped)
         if strict and not found.converged:
             raise ConvergenceError(
                 f"the rod's shape did not converge ({found.outcome}): residual {state.residual:.1e} rad after "
                 f"{found.iterations} iterations; strict=False returns it as it is"
             )
-        if found.converged and region is not None and len(found.factored.acting.points):
-            inside = np.asarray(region.contains(found.factored.acting.points))
-            if not inside.all():
-                worst = found.factored.acting.points[np.flatnonzero(~inside)[0]] * 1e3
-                raise OutsideRegionError(
-                    f"a magnet of the rod ends at ({worst[0]:.4g}, {worst[1]:.4g}, {worst[2]:.4g}) mm, outside the "
-                    f'field\'s region ({region.describe()}); outside="extrapolate" takes it as it is'
-                )
         return state
 
     @cached_property
@@ -183,7 +186,7 @@ class Rod:
 
 def _snapped(guess: RodState, found: Factored, expected: float) -> bool:
     """Whether the rod turned far more than the guess's own answer to the change of loads."""
-    return largest_turn(guess.frames, found.shape.R) > max(SNAP, 4 * expected)
+    return largest_turn(guess.frames, found.shape.R) > max(SNAP, 2 * expected)
 
 
 def largest_turn(before: Floats, after: Floats) -> float:

@@ -15,8 +15,8 @@ from magfem.typing import ArrayLike, Floats
 Curvature: TypeAlias = ArrayLike | Callable[[Floats], Floats]
 """(3,) 1/m, or a function of arc length (n,) m from the section's start that gives (n, 3)."""
 
-ELEMENTS, MAGNETIC_ELEMENTS = 16, 256
-"""Of a flexible section, by default; and of a hard-magnetic one, whose torques act at the nodes."""
+ELEMENTS, TORQUE_ELEMENTS, MAGNETIC_ELEMENTS = 16, 64, 256
+"""Of a flexible section, by default; of one with moments per length and of a hard-magnetic one, which act at nodes."""
 
 
 @dataclass(frozen=True)
@@ -30,8 +30,7 @@ class CrossSection:
 
     def __post_init__(self) -> None:
         for name in ("area", "second_moment_x", "second_moment_y", "torsion_constant"):
-            if not 0 < getattr(self, name) < np.inf:
-                raise InputError(f"cross-section: {name} must be positive and finite, got {getattr(self, name)!r}")
+            positive("cross-section", name, getattr(self, name))
 
     @classmethod
     def disc(cls, radius: float) -> CrossSection:
@@ -41,7 +40,7 @@ class CrossSection:
     @classmethod
     def tube(cls, inner_radius: float, outer_radius: float) -> CrossSection:
         """A circular ring, radii in m."""
-        if not (0 <= inner_radius < outer_radius < np.inf):
+        if not (is_number(inner_radius) and is_number(outer_radius) and 0 <= inner_radius < outer_radius):
             raise InputError(
                 f"cross-section: a tube needs 0 ≤ inner radius < outer radius, got {inner_radius!r} and "
                 f"{outer_radius!r} m"
@@ -52,7 +51,7 @@ class CrossSection:
     @classmethod
     def rectangle(cls, width: float, height: float) -> CrossSection:
         """Sides in m along x and y; the torsion constant by Saint-Venant's series (Timoshenko & Goodier, § 109)."""
-        if not (0 < width < np.inf and 0 < height < np.inf):
+        if not (is_number(width) and is_number(height) and width > 0 and height > 0):
             raise InputError(f"cross-section: a rectangle needs two positive sides, got {width!r} and {height!r} m")
         a, b = max(width, height), min(width, height)
         odd = np.arange(1, 200, 2)
@@ -66,12 +65,13 @@ class FlexibleSection:
     """A stretch of elastic rod.
 
     length: m.  radius: m of its full circle, or of the tube's outside with `inner_radius`; or any `cross_section`.
-    youngs_modulus: Pa.  poisson_ratio: for G = E / 2(1 + ν), or `shear_modulus` Pa itself.  density: kg/m³, for its
+    youngs_modulus: Pa.  poisson_ratio: for G = E / 2(1 + ν), or `shear_modulus` Pa itself.  density: kg/m³, of its
     weight.  intrinsic_curvature: (3,) 1/m without load, in the section's axes, or a function of arc length; its third
     component is twist.  intrinsic_strain: (3,), dp/ds in the section's axes without load.  force_per_length: (3,) N/m
     and moment_per_length: (3,) N, in world axes, whatever the shape.  magnetic_moment_per_length: (3,) A·m in the
-    section's axes, of a hard-magnetic section.  elements: how many it is divided into (default 16, hard-magnetic 256);
-    the shape's error falls with their fourth power, that of a hard-magnetic section's torques with their square.
+    section's axes, of a hard-magnetic section.  elements: how many it is divided into (default 16, with moments per
+    length 64, hard-magnetic 256); the shape's error falls with their fourth power, that of torques along the section
+    with their square.
     Source of the constitutive law: dissertation, eq. 2.2; K = diag(EI_x, EI_y, GJ), diag(GA, GA, EA).
     """
 
@@ -93,9 +93,8 @@ class FlexibleSection:
     def __post_init__(self) -> None:
         positive("flexible section", "length", self.length)
         positive("flexible section", "youngs_modulus", self.youngs_modulus)
-        if not (isfinite(self.density) and self.density >= 0):
-            raise InputError(f"flexible section: density must not be negative (kg/m³), got {self.density!r}")
-        if not -1 < self.poisson_ratio <= 0.5:
+        not_negative("flexible section", "density", "kg/m³", self.density)
+        if not (is_number(self.poisson_ratio) and -1 < self.poisson_ratio <= 0.5):
             raise InputError(
                 f"flexible section: poisson_ratio must lie above -1 and up to 0.5, got {self.poisson_ratio!r}"
             )
@@ -103,6 +102,10 @@ class FlexibleSection:
             positive("flexible section", "shear_modulus", self.shear_modulus)
         if (self.radius is None) == (self.cross_section is None):
             raise InputError("flexible section: state either radius (m) or cross_section")
+        if not isinstance(self.cross_section, CrossSection | None):
+            raise InputError(
+                f"flexible section: cross_section is a CrossSection, got {type(self.cross_section).__name__}"
+            )
         if self.elements is not None and not (type(self.elements) is int and 2 <= self.elements <= 4096):
             raise InputError(f"flexible section: elements must be a whole number from 2 to 4096, got {self.elements!r}")
         _ = self.section
@@ -118,7 +121,9 @@ class FlexibleSection:
         """How many elements it is divided into."""
         if self.elements is not None:
             return self.elements
-        return MAGNETIC_ELEMENTS if np.any(np.asarray(self.magnetic_moment_per_length, float)) else ELEMENTS
+        if np.any(np.asarray(self.magnetic_moment_per_length, float)):
+            return MAGNETIC_ELEMENTS
+        return TORQUE_ELEMENTS if np.any(np.asarray(self.moment_per_length, float)) else ELEMENTS
 
     @property
     def section(self) -> CrossSection:
@@ -152,10 +157,8 @@ class MagnetSection:
     field_points: int = 1
 
     def __post_init__(self) -> None:
-        if not (isfinite(self.length) and self.length >= 0):
-            raise InputError(f"magnet section: length must not be negative (m), got {self.length!r}")
-        if not (isfinite(self.mass) and self.mass >= 0):
-            raise InputError(f"magnet section: mass must not be negative (kg), got {self.mass!r}")
+        not_negative("magnet section", "length", "m", self.length)
+        not_negative("magnet section", "mass", "kg", self.mass)
         if type(self.field_points) is not int or not 1 <= self.field_points <= 16:
             raise InputError(
                 f"magnet section: field_points must be a whole number from 1 to 16, got {self.field_points!r}"
@@ -165,15 +168,26 @@ class MagnetSection:
     @property
     def moment_vector(self) -> Floats:
         """(3,) A·m² in the magnet's axes."""
-        if isinstance(self.moment, int | float):
-            return three("magnet section", "moment", (0.0, 0.0, self.moment))
+        if isinstance(self.moment, int | float | np.number | np.ndarray) and np.ndim(self.moment) == 0:
+            return three("magnet section", "moment", (0.0, 0.0, self.moment))  # type: ignore[arg-type]
         return three("magnet section", "moment", self.moment)
 
 
 def positive(what: str, name: str, value: float) -> None:
     """Raise InputError unless `value` is positive and finite."""
-    if not (isinstance(value, int | float | np.floating | np.integer) and 0 < value < np.inf):
+    if not (is_number(value) and value > 0):
         raise InputError(f"{what}: {name} must be positive and finite, got {value!r}")
+
+
+def not_negative(what: str, name: str, unit: str, value: float) -> None:
+    """Raise InputError unless `value` is finite and not negative."""
+    if not (is_number(value) and value >= 0):
+        raise InputError(f"{what}: {name} must be finite and not negative ({unit}), got {value!r}")
+
+
+def is_number(value: object) -> bool:
+    """Whether `value` is one finite real number."""
+    return isinstance(value, int | float | np.floating | np.integer) and isfinite(value)
 
 
 def three(what: str, name: str, value: ArrayLike) -> Floats:

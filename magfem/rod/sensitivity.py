@@ -140,7 +140,7 @@ def _density(state: RodState) -> tuple[tuple[str, ...], Load]:
     chain, g = state.loads.chain, state.loads.gravity
     chosen = [k for k, one in enumerate(state.rod.sections) if isinstance(one, FlexibleSection)]
     load = np.zeros((chain.links + 1, 6, len(chosen)))
-    axis = state.factored.shape.R[:, :, 2]
+    R = state.factored.shape.R
     for column, k in enumerate(chosen):
         unit = chain_of(
             [
@@ -149,7 +149,7 @@ def _density(state: RodState) -> tuple[tuple[str, ...], Load]:
             ]
         )
         load[:, 3:, column] = unit.weight[:, None] * g
-        load[:, :3, column] = unit.axial_weight[:, None] * np.cross(axis, g)
+        load[:, :3, column] = np.cross(np.einsum("nij,nj->ni", R, unit.end_weight), g)
     return tuple(f"section {k}" for k in chosen), (None, load, None)
 
 

@@ -81,7 +81,7 @@ class RodState:
     @property
     def unstable_directions(self) -> int:
         """Negative eigenvalues of the energy's Hessian: along how many directions the rod would leave this shape."""
-        return self.factored.negative
+        return self.factored.unstable_directions
 
     @property
     def residual(self) -> float:

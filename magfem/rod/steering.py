@@ -34,6 +34,7 @@ has no stable shape to go on to.  unreachable: no way was found on the model, wh
 """
 
 _PROGRESS = 0.02  # of the error: less is no progress
+_ANOTHER_SHAPE = 0.7  # rad between the model's axis and the plant's
 _NOTICEABLE = 0.005  # of the stiffness: less is not worth a new model
 
 
@@ -120,7 +121,9 @@ class Controller:
     @cached_property
     def limits(self) -> tuple[Floats, Floats]:
         """Lowest and highest of all parameters (c + j,)."""
-        top: Floats = np.array([np.inf if one.current_limit is None else one.current_limit for one in self.system.coils])
+        top: Floats = np.array(
+            [np.inf if one.current_limit is None else one.current_limit for one in self.system.coils]
+        )
         if self.current_limit is not None:
             top = np.minimum(top, self.current_limit)
         if not np.isfinite(top).all():
@@ -161,7 +164,7 @@ class Controller:
         now = replace(now, best=error.size if better else now.best, since=0 if better else now.since + 1)
         if error.size <= self.tolerance:
             return replace(now, outcome="converged")
-        if _jumped(before, positions, frames):
+        if _jumped(before, positions, frames) or _elsewhere(now.model, frames):
             return replace(now, outcome="lost branch")
         if self.adapt:
             now = self._adapted(now, positions, frames)
@@ -257,6 +260,11 @@ class Controller:
             if model.stable and not model.snapped:
                 return there, model
         return None
+
+
+def _elsewhere(model: RodState, frames: Floats) -> bool:
+    """Whether the model's magnets point so far from the plant's that it must have another shape."""
+    return bool(np.any(np.sum(model.magnet_frames[:, :, 2] * frames[:, :, 2], axis=1) < np.cos(_ANOTHER_SHAPE)))
 
 
 def _why_stuck(at_limit: bool, singular: bool) -> str:

@@ -14,7 +14,8 @@ from magfem.rod.state import RodState
 from magfem.typing import Floats, Points
 
 _FORGET = 0.9  # of what earlier measurements weigh, for each new one
-_LARGEST = log(3.0)  # either way: beyond, it is not the stiffness that is wrong
+_LARGEST = log(2.0)  # either way: beyond, it is not the stiffness that is wrong
+_NEAR = 0.35  # rad and POSITION_SCALE, the largest misfit of a magnet: beyond, the model has another shape
 _LEAST = 1e-6  # rad² of information below which a measurement says nothing
 _EXPLAINED = 0.5  # of the squared misfit: a factor that explains less is not believed
 
@@ -45,11 +46,12 @@ def updated(
     moduli = np.array([one.youngs_modulus for one in model.rod.sections if isinstance(one, FlexibleSection)])
     frames = model.magnet_frames[:, :, 2]
     shift = moved.positions[nodes] @ moduli / POSITION_SCALE
-    turn = np.cross(moved.rotations[nodes] @ moduli, frames)
+    a, b = moved.rotations[nodes] @ moduli, frames
+    turn = a[:, [1, 2, 0]] * b[:, [2, 0, 1]] - a[:, [2, 0, 1]] * b[:, [1, 2, 0]]
     slope = np.concatenate([shift, turn]).ravel()
     misfit = np.concatenate([(positions - model.magnet_positions) / POSITION_SCALE, axes - frames]).ravel()
     information = float(slope @ slope)
-    if information < _LEAST:
+    if information < _LEAST or np.abs(misfit).max() > _NEAR:
         return before
     step = float(slope @ misfit) / information
     unexplained = misfit - step * slope

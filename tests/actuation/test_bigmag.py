@@ -101,3 +101,41 @@ def test_eight_amperes_are_the_limit(bigmag):
     bigmag.B([0, 0, 0], [8, -8, 8, -8, 8, -8])
     with pytest.raises(InputError, match='coil "3" of BigMag, six mobile coils bears up to 8 A'):
         bigmag.B([0, 0, 0], [0, 0, 0, 8.1, 0, 0])
+
+
+def test_joints_turn_the_published_way(bigmag, direct):
+    """pose(γ) = Rz(γ) pose₀, γ_bottom first: coils 0, 1, 4 with it, coils 2, 3, 5 with γ_top."""
+    assert [joint.name for joint in bigmag.joints] == ["gamma_bottom", "gamma_top"]
+    limits = PUBLISHED["frames"]["mobility_limits_code_deg"]
+    points = bigmag.workspace.random_points(np.random.default_rng(5), 40)
+    angles = np.array([0.7, -1.9])
+    rows = bigmag.unit_fields(points, angles)
+    for joint, angle in zip(bigmag.joints, angles, strict=True):
+        np.testing.assert_allclose(np.degrees(joint.limits), limits, rtol=1e-15)
+        c, s = np.cos(angle), np.sin(angle)
+        turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+        B, gradient = direct(points @ turn)
+        for k, published in enumerate(PUBLISHED["coils"]):
+            if published["mobility"] == joint.name:
+                np.testing.assert_allclose(rows[:, :3, k], B[:, k] @ turn.T, rtol=1e-10, atol=1e-18)
+                expected = (turn @ gradient[:, k] @ turn.T).reshape(-1, 9)[:, [0, 1, 2, 4, 5]]
+                np.testing.assert_allclose(rows[:, 3:, k], expected, atol=1e-11 * np.abs(expected).max())
+
+
+def test_extended_bigmag_is_bigmag_and_two_full_rings(bigmag):
+    """Six of its coils are the published ones; four more on each joint, mirror images, at angles of a hexagon."""
+    extended = magfem.load_system("bigmag_extended")
+    assert len(extended.coils) == 14 and extended.joints == bigmag.joints and extended.region is extended.workspace
+    for own, published in zip(extended.coils, bigmag.coils, strict=False):
+        assert own.joint == published.joint and own.pose.as_matrix().tolist() == published.pose.as_matrix().tolist()
+    places = np.array([coil.pose.translation for coil in extended.coils[6:]])
+    axes = np.array([coil.pose.rotation.as_matrix()[:, 2] for coil in extended.coils[6:]])
+    np.testing.assert_allclose(np.linalg.norm(places, axis=1), 0.10215, rtol=1e-9)
+    np.testing.assert_allclose(axes, -places / 0.10215, atol=1e-10)  # towards the middle
+    np.testing.assert_allclose(np.degrees(np.arctan2(places[:, 1], places[:, 0])) % 360, [60, 120, 240, 300] * 2)
+    np.testing.assert_allclose(places[:4] * [1, 1, -1], places[4:])
+    elevations = [
+        np.degrees(np.arcsin(abs(coil["p0_m"][2]) / np.linalg.norm(coil["p0_m"]))) for coil in PUBLISHED["coils"][:4]
+    ]
+    np.testing.assert_allclose(np.degrees(np.arcsin(-places[0, 2] / 0.10215)), np.mean(elevations), atol=0.1)
+    assert [coil.joint for coil in extended.coils[6:]] == ["gamma_bottom"] * 4 + ["gamma_top"] * 4

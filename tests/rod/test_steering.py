@@ -1,0 +1,162 @@
+"""Steering: the closed loop against the plant's own states, limits, and what it says when it cannot go on."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rod.steered_rod import drive, stable_targets, two_magnets
+from scipy.spatial.transform import Rotation
+
+import magfem
+from magfem.errors import InputError
+from magfem.rod import Goal
+from magfem.rod.steering import OUTCOMES, Controller
+
+
+@pytest.fixture(scope="module")
+def bigmag():
+    return magfem.load_system("bigmag")
+
+
+def directions(axes):
+    return [Goal(magnet=m, direction=axis) for m, axis in enumerate(axes)]
+
+
+def degrees_off(state, axes):
+    found = state.magnet_frames[:, :, 2]
+    return np.degrees(np.arctan2(np.linalg.norm(np.cross(found, axes), axis=1), np.sum(found * axes, axis=1)))
+
+
+def test_twenty_planar_targets_with_a_plant_15_percent_stiffer(bigmag):
+    plant, model = two_magnets(1.15), two_magnets()
+    for axes in stable_targets(bigmag, plant, 20, seed=8, planar=True):
+        controller = Controller(rod=model, system=bigmag, goals=directions(axes))
+        now, state, _ = drive(controller, plant)
+        assert now.outcome == "converged"
+        # What the loop believes is checked on the plant, solved anew at the currents that were found.
+        assert degrees_off(plant.solve((bigmag, now.currents, now.joints), guess=state), axes).max() < 0.1
+        assert now.in_use == pytest.approx(1.15, rel=0.03)
+
+
+def test_currents_rates_and_joints_keep_their_limits(bigmag):
+    plant = two_magnets(1.15)
+    axes = stable_targets(bigmag, plant, 1, seed=2, planar=True)[0]
+    goals = directions(axes)
+    controller = Controller(
+        rod=two_magnets(), system=bigmag, goals=goals, current_limit=5.0, joint_limits=[[-0.2, 0.2], [0, 0]]
+    )
+    _, _, history = drive(controller, plant, most_steps=120)
+    currents, joints = (np.array([getattr(one, name) for one in history]) for name in ("currents", "joints"))
+    assert np.abs(currents).max() <= 5.0
+    assert np.abs(joints[:, 0]).max() <= 0.2 and np.all(joints[:, 1] == 0)
+    assert np.abs(np.diff(currents, axis=0)).max() <= 0.4 + 1e-12
+    assert np.abs(np.diff(joints, axis=0)).max() <= np.radians(2) + 1e-12
+
+
+def test_a_mix_of_position_and_direction(bigmag):
+    plant = two_magnets(1.1)
+    goal_state = plant.solve((bigmag, [2.0, -1.0, 1.5, 2.5, -3.0, 1.0], [0.1, -0.2]))
+    goals = [Goal(magnet=1, position=goal_state.magnet_positions[1], direction=goal_state.magnet_frames[1, :, 2])]
+    now, state, _ = drive(Controller(rod=two_magnets(), system=bigmag, goals=goals), plant)
+    assert now.outcome == "converged"
+    assert np.linalg.norm(state.magnet_positions[1] - goal_state.magnet_positions[1]) < 0.05e-3
+    assert degrees_off(state, goal_state.magnet_frames[:, :, 2])[1] < 0.1
+
+
+def test_without_adapting_the_model_stays_what_it_was(bigmag):
+    plant = two_magnets(1.15)
+    axes = stable_targets(bigmag, plant, 1, seed=3, planar=True)[0]
+    now, state, _ = drive(Controller(rod=two_magnets(), system=bigmag, goals=directions(axes), adapt=False), plant)
+    assert now.outcome == "converged" and now.in_use == 1.0
+    assert degrees_off(state, axes).max() < 0.1
+
+
+def test_backwards_is_unreachable_and_says_so(bigmag):
+    """No state at ±1 A lets both magnets look back at the base: neither steering nor any plan finds a way."""
+    goals = [Goal(magnet=0, direction=(-1, 0, 0)), Goal(magnet=1, direction=(-1, 0, 0))]
+    controller = Controller(rod=two_magnets(), system=bigmag, goals=goals, current_limit=1.0, patience=30)
+    now, _, history = drive(controller, two_magnets(1.15))
+    assert now.outcome == "unreachable"
+    assert "limit active" in {one.outcome for one in history}
+    assert np.abs(now.currents).max() <= 1.0
+
+
+def test_a_goal_that_no_parameter_moves_is_singular(bigmag):
+    """Coils in one plane cannot turn a magnet about its own axis: forces and torques stay in the plane."""
+    model = two_magnets()
+    start = model.solve((bigmag, np.zeros(6), None))
+    wanted = start.magnet_rotations[1] * Rotation.from_euler("z", 20, degrees=True)
+    controller = Controller(
+        rod=model, system=bigmag, goals=[Goal(magnet=1, rotation=wanted)], joint_limits=[[0, 0], [0, 0]], patience=20
+    )
+    now = controller.begin()
+    for _ in range(60):
+        now = controller.advance(now, now.model.magnet_positions, now.model.magnet_frames)
+        if now.outcome != "moving":
+            break
+    assert now.outcome in ("singular", "limit active")
+    assert now.condition > 1e5
+
+
+def test_a_snap_of_the_plant_is_seen(bigmag):
+    plant = two_magnets()
+    axes = stable_targets(bigmag, plant, 1, seed=4, planar=True)[0]
+    controller = Controller(rod=two_magnets(), system=bigmag, goals=directions(axes))
+    now = controller.begin()
+    state = plant.solve((bigmag, now.currents, now.joints))
+    now = controller.advance(now, state.magnet_positions, state.magnet_frames)
+    elsewhere = plant.solve((bigmag, [8.0, -8, 8, -8, 8, 8], None), strict=False)
+    after = controller.advance(now, elsewhere.magnet_positions, elsewhere.magnet_frames)
+    assert after.outcome == "lost branch"
+    assert np.all(after.currents == now.currents)
+
+
+def test_equal_inputs_give_equal_outputs(bigmag):
+    plant = two_magnets(1.15)
+    axes = stable_targets(bigmag, plant, 1, seed=5, planar=True)[0]
+    runs = [drive(Controller(rod=two_magnets(), system=bigmag, goals=directions(axes)), plant)[0] for _ in range(2)]
+    assert np.array_equal(runs[0].currents, runs[1].currents)
+
+
+def test_random_walks_are_followed_and_snaps_are_flagged(bigmag):
+    """600 steps of up to 0.4 A and 2° at ±8 A: what turns by more than 20° at once says that it has snapped."""
+    rod, rng = two_magnets(), np.random.default_rng(1)
+    currents, joints = np.zeros(6), np.zeros(2)
+    state, lost = rod.solve((bigmag, currents, joints)), 0
+    for _ in range(600):
+        next_currents = np.clip(currents + rng.uniform(-0.4, 0.4, 6), -8, 8)
+        next_joints = joints + np.radians(rng.uniform(-2, 2, 2))
+        found = rod.solve((bigmag, next_currents, next_joints), guess=state, strict=False)
+        if not found.stable:
+            lost += 1
+            continue
+        turned = np.degrees((found.magnet_rotations * state.magnet_rotations.inv()).magnitude()).max()
+        assert turned < 20 or found.snapped
+        state, currents, joints = found, next_currents, next_joints
+    assert lost <= 3
+
+
+def test_cold_starts_reach_a_stable_equilibrium_or_say_why(bigmag):
+    rod, rng = two_magnets(), np.random.default_rng(11)
+    outcomes = [rod.solve((bigmag, rng.uniform(-8, 8, 6), None), strict=False).outcome for _ in range(300)]
+    assert outcomes.count("stable") >= 297
+    assert set(outcomes) <= {"stable", "outside"}
+
+
+def test_input_that_cannot_be_steered_by(bigmag):
+    rod, goal = two_magnets(), Goal(magnet=0, direction=(1, 0, 0))
+    with pytest.raises(InputError, match="at least one goal"):
+        Controller(rod=rod, system=bigmag, goals=[])
+    with pytest.raises(InputError, match="gain must be positive"):
+        Controller(rod=rod, system=bigmag, goals=[goal], gain=0.0)
+    with pytest.raises(InputError, match="2 pairs"):
+        Controller(rod=rod, system=bigmag, goals=[goal], joint_limits=[[0, 1]])
+    with pytest.raises(InputError, match="current_limit"):
+        Controller(
+            rod=rod,
+            system=replace(bigmag, coils=tuple(replace(c, current_limit=None) for c in bigmag.coils)),
+            goals=[goal],
+        )
+    assert len(set(OUTCOMES)) == 7
