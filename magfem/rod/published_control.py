@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from magfem.actuation.wrench import field_to_wrench
 from magfem.errors import InputError
 from magfem.rod.goals import Goal, GoalError, goal_error
 from magfem.rod.rod import Rod
@@ -38,7 +39,7 @@ The published controller does not notice anything else: it runs on where a goal 
 class PublishedSteering:
     """Where the published controller is.
 
-    currents (c,) A, joints (j,) rad or m.  base_wrench: (6,) ξ of the last shape.  wrench: (m, 6) torque and force
+    currents (c,) A, joints (j,) rad or m.  base_wrench: (6,) ξ of the last shape.  wrench: (m, 6) force and torque
     that it was found under.  summed: (2g,) the integrated errors.  error: of the last measurement, as `steering`
     measures it.  orientation_error: (2g,) eq. 2.20.  jacobian: (2g, c + j) eq. 2.19.  condition: its largest over its
     smallest singular value.  iterations: of Levenberg–Marquardt, all boundary value problems of the last step.
@@ -85,8 +86,8 @@ class PublishedController:
     gravity: ArrayLike = (0.0, 0.0, -9.81)
     current_difference: float = 0.2
     joint_difference: float = float(np.radians(2.0))
-    proportional: float = 0.3
-    integral: float = 0.0
+    proportional: float = 0.8
+    integral: float = 0.01
     reset: float = float(np.radians(1.0))
     current_limit: float | None = 8.0
     joint_limits: ArrayLike | None = None
@@ -144,7 +145,7 @@ class PublishedController:
         amperes = np.zeros(len(self.system.coils)) if currents is None else np.array(currents, dtype=float)
         values = np.zeros(len(self.system.joints)) if joints is None else np.array(joints, dtype=float)
         none = np.zeros((len(self.rod.magnets), 6))
-        shape = self.statics.solve(none[:, 3:], none[:, :3])
+        shape = self.statics.solve(none[:, :3], none[:, 3:])
         return PublishedSteering(
             currents=amperes,
             joints=values,
@@ -229,7 +230,7 @@ class PublishedController:
         return np.stack(columns, axis=1), iterations
 
     def current_to_wrench(self, positions: Points, frames: Floats, joints: Floats) -> Floats:
-        """T = T_µ T_β, eqs. 2.12–2.16: (m, 6, c), torque (N·m/A), then force (N/A) of every magnet."""
+        """T = T_µ T_β, eqs. 2.12–2.16: (m, 6, c), force (N/A), then torque (N·m/A) of every magnet."""
         moments = np.einsum("mij,mj->mi", frames, self._own_moments)
         fields = self.system.unit_fields(positions, joints, outside="extrapolate")
         wrenches: Floats = field_to_wrench(moments) @ fields
@@ -240,7 +241,7 @@ class PublishedController:
         guess = base_wrench
         if self.informed:
             guess = informed_guess(base_wrench, wrench - before, positions - self.rod.base.translation)
-        return self.statics.solve(wrench[:, 3:], wrench[:, :3], guess)
+        return self.statics.solve(wrench[:, :3], wrench[:, 3:], guess)
 
     def _rows(self, shape: ShotShape) -> Floats:
         """(2g,) k_d·k and φ of the theoretical shape, whose differences are eq. 2.18."""
@@ -279,22 +280,9 @@ def axis_angle(tangents: Vectors, wanted_axes: Vectors, keep_sign: bool = False)
     return sign[:, None] * axes, sign * angles
 
 
-def field_to_wrench(moments: Vectors) -> Floats:
-    """T_µ, eqs. 2.14, 2.15: (m, 6, 8) from B and the five gradients to torque, then force, of moments (m, 3) A·m²."""
-    x, y, z = moments.T
-    T = np.zeros((len(moments), 6, 8))
-    T[:, 0, 1], T[:, 0, 2] = -z, y
-    T[:, 1, 0], T[:, 1, 2] = z, -x
-    T[:, 2, 0], T[:, 2, 1] = -y, x
-    T[:, 3, 3], T[:, 3, 4], T[:, 3, 5] = x, y, z
-    T[:, 4, 4], T[:, 4, 6], T[:, 4, 7] = x, y, z
-    T[:, 5, 3], T[:, 5, 5], T[:, 5, 6], T[:, 5, 7] = -z, x, -z, y
-    return T
-
-
 def informed_guess(base_wrench: Floats, change: Floats, arms: Points) -> Floats:
-    """ξ (6,) after the wrenches (m, 6), torque and force, change at `arms` (m, 3) m from the base, eq. 2.17."""
-    torque, force = change[:, :3], change[:, 3:]
+    """ξ (6,) after the wrenches (m, 6), force and torque, change at `arms` (m, 3) m from the base, eq. 2.17."""
+    force, torque = change[:, :3], change[:, 3:]
     guess: Floats = base_wrench + np.concatenate([force.sum(axis=0), (torque + np.cross(arms, force)).sum(axis=0)])
     return guess
 

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import RigidTransform, Rotation
+from rod.steered_rod import stable_targets, two_magnets
+from scipy.spatial.transform import Rotation
 
 import magfem
 from magfem.errors import InputError
@@ -15,7 +16,6 @@ from magfem.rod.goals import goal_error
 from magfem.rod.published_control import (
     PublishedController,
     axis_angle,
-    field_to_wrench,
     informed_guess,
     truncated_inverse,
 )
@@ -26,18 +26,8 @@ from magfem.typing import Floats, Vectors
 
 BIGMAG = magfem.load_system("bigmag")
 GRAVITY = np.array([0.0, 0.0, -9.81])
-MASS, MOMENT = 1e-4, 0.019
+MASS, MOMENTS = 1.47e-4, np.array([[-0.021], [0.021]])  # of the magnets of `two_magnets`
 CURRENTS, JOINTS = np.array([5.0, -3.0, 4.0, 2.0, -6.0, 3.0]), np.array([0.3, -0.5])
-
-
-def two_magnets(elements: int = 16, stiffness: float = 1.0) -> Rod:
-    """Along +x through the middle of BigMag."""
-    rubber = FlexibleSection(
-        length=0.025, radius=1.75e-3, youngs_modulus=5.5e6 * stiffness, density=1040, elements=elements
-    )
-    magnet = MagnetSection(length=5e-3, moment=MOMENT, mass=MASS)
-    base = RigidTransform.from_components([-0.03, 0, 0], Rotation.from_euler("y", 90, degrees=True))
-    return Rod([rubber, magnet, rubber, magnet], base)
 
 
 def steer(rod: Rod, directions: Vectors, **settings: object) -> PublishedController:
@@ -107,14 +97,15 @@ def test_the_length_of_the_quaternion_turns_nothing() -> None:
 # Maps
 
 
-def test_the_map_from_field_to_wrench_is_that_of_a_dipole() -> None:
-    """µ × B and ∇(µ·B), eq. 2.13, from the whole gradient."""
-    rng = np.random.default_rng(2)
-    points, moments = rng.uniform(-0.02, 0.02, (5, 3)), rng.normal(size=(5, 3))
+def test_the_map_from_currents_to_wrenches_is_that_of_dipoles() -> None:
+    """∇(µ·B) and µ × B, eq. 2.13, from the whole gradient."""
+    rod = two_magnets()
+    points, frames = np.array([[0.0, 0.01, 0.0], [0.02, 0.0, 0.01]]), Rotation.random(2, 2).as_matrix()
     B, gradient = BIGMAG.jet(points, CURRENTS, JOINTS)
-    wrench = (field_to_wrench(moments) @ BIGMAG.unit_fields(points, JOINTS)) @ CURRENTS
-    assert np.allclose(wrench[:, :3], np.cross(moments, B), atol=1e-12)
-    assert np.allclose(wrench[:, 3:], np.einsum("ni,nij->nj", moments, gradient), atol=1e-9)
+    moments = MOMENTS * frames[:, :, 2]
+    wrench = steer(rod, np.eye(3)[:2]).current_to_wrench(points, frames, JOINTS) @ CURRENTS
+    assert np.allclose(wrench[:, :3], np.einsum("ni,nij->nj", moments, gradient), rtol=1e-9)
+    assert np.allclose(wrench[:, 3:], np.cross(moments, B), rtol=1e-9)
 
 
 def test_an_axis_and_its_angle_turn_z_to_the_tangent() -> None:
@@ -165,8 +156,7 @@ def dead_jacobian(state: RodState) -> Floats:
     S = state.factored.answer(node_load=unit)[1][nodes].reshape(12, 12)  # turn before shift, torque before force
     K = np.zeros((12, 12))
     B, G, H = BIGMAG.jet(state.magnet_positions, CURRENTS, JOINTS, order=2)
-    for m, frame in enumerate(state.magnet_frames):
-        mu = MOMENT * frame[:, 2]
+    for m, mu in enumerate(MOMENTS * state.magnet_frames[:, :, 2]):
         for i, axis in enumerate(np.eye(3)):
             turned = np.cross(axis, mu)
             K[6 * m : 6 * m + 3, 6 * m + i] = np.cross(turned, B[m])
@@ -231,8 +221,8 @@ def test_an_informed_guess_is_right_for_a_rod_that_does_not_yield() -> None:
     shooting = Shooting(rod=rod, gravity=(0, 0, 0), threshold=1e-12)
     forces, torques = np.array([[0.01, 0.02, -0.03], [0.02, 0.0, 0.01]]), np.array([[1e-4, 0, 2e-4], [0, -1e-4, 0]])
     shape = shooting.solve(forces, torques)
-    arms = np.array([[0.0275, 0, 0], [0.0575, 0, 0]])
-    guess = informed_guess(np.zeros(6), np.concatenate([torques, forces], axis=1), arms)
+    arms = np.array([[0.027, 0, 0], [0.056, 0, 0]])
+    guess = informed_guess(np.zeros(6), np.concatenate([forces, torques], axis=1), arms)
     assert np.allclose(shape.base_wrench, guess, rtol=1e-4, atol=1e-8)
 
 
@@ -267,10 +257,9 @@ def test_the_error_of_the_axis_has_no_slope_at_the_goal() -> None:
 
 
 def test_it_steers_two_magnets_in_the_plane_to_a_shape_that_exists() -> None:
-    """The plant is 15 % stiffer than the model; the target is the plant's own shape at other currents."""
-    plant, model = two_magnets(stiffness=1.15), two_magnets()
-    there = plant.solve((BIGMAG, np.random.default_rng(2).uniform(-8, 8, 6), np.zeros(2)))
-    directions = there.magnet_frames[:, :, 2]
+    """The plant is 15 % stiffer than the model; the target is one of the plant's own shapes."""
+    plant, model = two_magnets(1.15), two_magnets()
+    directions = stable_targets(BIGMAG, plant, 1, seed=8, planar=True)[0]
     controller = steer(model, directions)
     now = controller.begin()
     shape = plant.solve((BIGMAG, now.currents, now.joints))
@@ -281,7 +270,7 @@ def test_it_steers_two_magnets_in_the_plane_to_a_shape_that_exists() -> None:
             break
         assert np.abs(now.currents).max() <= 8
         shape = plant.solve((BIGMAG, now.currents, now.joints), guess=shape)
-    assert began > np.radians(10)
+    assert began > np.radians(10)  # the way is long enough to be one
     assert now.outcome == "converged"
     reached = np.linalg.norm(np.cross(shape.magnet_frames[:, :, 2], directions), axis=1)
     assert np.degrees(np.arcsin(reached)).max() < 0.05
