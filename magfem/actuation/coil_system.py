@@ -162,6 +162,10 @@ class CoilSystem:
             coils.append(coil)
         return replace(self, coils=tuple(coils), joints=())
 
+    def joint_motions(self, joints: ArrayLike | None = None) -> Floats:
+        """How every joint's body is moved from where it is at zero: (j, 3, 4), rotation and translation (m)."""
+        return self._moving.motions(self.checked_joints(joints))
+
     def unit_jets(self, points: Points, joints: Floats | None, order: int) -> Jet:
         """What every coil does per ampere: B (c, n, 3), gradient (c, n, 3, 3), hessian (c, n, 3, 3, 3) up to `order`.
 

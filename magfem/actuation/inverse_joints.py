@@ -1,9 +1,12 @@
 """Joints and currents together: the smallest currents that produce what is wanted, wherever joints may put the coils.
 
-The dissertation (3.24, 3.25) searches the joints alone and takes the currents of each from a pseudo-inverse. Here both
-are unknowns of one problem with its exact derivatives, so that limits and tolerances hold at the solution:
+As in the dissertation (3.24, 3.25) the joints q are searched and the currents of each follow from a linear problem, but
+here that one keeps limits and tolerances, and its value has an exact slope. With slack s that costs ρ,
 
-    minimise ½ Σ (I/limit)²   subject to   rows(I, q) = wanted, |rows(I, q) − wanted| ≤ within, limits on I and q.
+    φ(q) = min ½ |I|² + ½ ρ |s|²   subject to   rows(I, q) + s = wanted (or within of it), |I| ≤ limits,
+
+is smooth where rows can just not be met as well, and by the envelope theorem ∂φ/∂q = −λ·∂rows/∂q with the multipliers
+λ = ρ s. Variable projection; see Golub & Pereyra, Inverse Problems 19, R1 (2003).
 """
 
 from __future__ import annotations
@@ -13,13 +16,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import least_squares, minimize
+from scipy.optimize import minimize
 
 from magfem.actuation.inverse import (
     CUTOFF,
     METHODS,
     CurrentSolution,
     Method,
+    Problem,
     checked_problem,
     solution,
 )
@@ -30,6 +34,8 @@ from magfem.typing import ArrayLike, Floats
 
 if TYPE_CHECKING:
     from magfem.actuation.coil_system import CoilSystem
+
+_SLACK = 1e-4  # 1/√ρ: what the coils do at their limits, missed by this, costs as much as a coil's limit
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,10 +65,10 @@ def find_currents_and_joints(
 ) -> JointSolution:
     """Currents and joint values of least norm that produce what is wanted, within the limits of both.
 
-    Searches from `joints` (None: zero) and from starts − 1 random joint values, sequential quadratic programming with
-    exact derivatives, and keeps the best. When no start meets the targets, the smallest misses are searched instead.
-    At the best joints the currents are those of `find_currents` by `method`.
-    The targets must lie in the system's region wherever the joints are searched; places are checked at the solution.
+    Searches from `joints` (None: zero) and from starts − 1 random joint values, by exact derivatives, and keeps the
+    best; where targets cannot be met, the joints at which least is missed. At the best joints the currents are those
+    of `find_currents` by `method`. Whether the targets lie in the system's region is checked at the first joint values
+    and at the last.
 
     Raises as `find_currents`, and ConvergenceError when no search converged, unless strict=False.
     """
@@ -77,11 +83,8 @@ def find_currents_and_joints(
     low, high = np.array([joint.limits for joint in system.joints]).T
     random = np.random.default_rng(seed).uniform(low, high, (starts - 1, len(first)))
     begins = np.vstack([first, random])
-    searched = [search.smallest(begin, low, high, iterations) for begin in begins]
+    searched = [search.end(begin, low, high, iterations) for begin in begins]
     found = [solution(system, rows, q, bounds, "least_norm", cutoff, False) for q, _, _ in searched]
-    if not any(one.met for one in found):
-        searched = [search.nearest(q, low, high, iterations) for q, _, _ in searched]
-        found = [solution(system, rows, q, bounds, "least_norm", cutoff, False) for q, _, _ in searched]
     norms = np.array([one.norm if one.met else np.nan for one in found])
     best = int(np.nanargmin(norms) if np.isfinite(norms).any() else np.argmin([one.residual for one in found]))
     end, count, converged = searched[best]
@@ -98,90 +101,35 @@ def find_currents_and_joints(
 
 
 class _Search:
-    """Rows and their derivatives at unknowns u = (currents over their size, joint values); the last ones are kept."""
+    """The smallest currents as a function of the joints."""
 
     def __init__(self, system: CoilSystem, rows: Demand, limits: Floats, first: Floats) -> None:
         self.system, self.rows, self.limits = system, rows, limits
-        self.size = np.where(np.isfinite(limits), limits, 1.0)
-        self.c = len(limits)
+        self.ampere = float(limits[np.isfinite(limits)].max(initial=1.0))  # currents count in these
         self.background = rows.background(system)
-        scale = rows.scale(rows.unit(system.unit_jets(rows.points, first, 1)), limits)
-        self.exact = rows.independent(scale, np.flatnonzero(rows.within == 0))
-        self.inexact = np.flatnonzero(rows.within > 0)
-        self.last = np.full(self.c + len(first), np.nan)
-        self.value, self.slope = np.empty(0), np.empty((0, 0))
+        self.scale = rows.scale(rows.unit(system.unit_jets(rows.points, first, 1)), limits)
 
-    def at(self, u: Floats) -> tuple[Floats, Floats]:
-        """Rows less what is wanted (r,), and their derivative (r, c + j)."""
-        if not np.array_equal(u, self.last):
-            currents, joints = u[: self.c] * self.size, np.ascontiguousarray(u[self.c :])
-            jets = self.system.unit_jets(self.rows.points, joints, 2)
-            unit = self.rows.unit(jets)
-            moved = eight_numbers(*self.system.joint_jets(self.rows.points, currents, joints, jets))
-            by_joint = np.einsum("rte,jte->rj", self.rows.select, moved)
-            self.value = self.background + unit @ currents - self.rows.wanted
-            self.slope = np.hstack([unit * self.size, by_joint])
-            self.last = u.copy()
-        return self.value, self.slope
+    def value(self, joints: Floats) -> tuple[float, Floats]:
+        """φ and its slope (j,)."""
+        rows, system, count = self.rows, self.system, len(self.limits)
+        jets = system.unit_jets(rows.points, np.ascontiguousarray(joints), 2)
+        matrix = np.hstack([rows.unit(jets) * (self.ampere / self.scale[:, None]), _SLACK * np.eye(len(self.scale))])
+        limits = np.append(self.limits / self.ampere, np.full(len(self.scale), np.inf))
+        wanted, within = (rows.wanted - self.background) / self.scale, rows.within / self.scale
+        y = Problem(matrix, wanted, within, limits, 0.0).shortest(limits)
+        assert y is not None, "slack meets every row"
+        jet = system.joint_jets(rows.points, y[:count] * self.ampere, np.ascontiguousarray(joints), jets)
+        by_joint = np.einsum("rte,jte->rj", rows.select, eight_numbers(*jet)) / self.scale[:, None]
+        return 0.5 * float(y @ y), -(y[count:] / _SLACK) @ by_joint
 
-    def begin(self, joints: Floats) -> Floats:
-        """Unknowns to begin with: these joints, and the best currents there."""
-        there = solution(self.system, self.rows, joints, self.limits, "least_norm", CUTOFF, False)
-        return np.concatenate([there.currents / self.size, joints])
-
-    def smallest(self, joints: Floats, low: Floats, high: Floats, iterations: int) -> tuple[Floats, int, bool]:
-        """Joints, iterations and success of a search for the least norm."""
-        ones, c = self.limits / self.size, self.c
-        weight = np.concatenate([np.ones(c), np.zeros(len(joints))])
-        constraints = []
-        if len(self.exact):
-            constraints.append(
-                {
-                    "type": "eq",
-                    "fun": lambda u: self.exact @ self.at(u)[0],
-                    "jac": lambda u: self.exact @ self.at(u)[1],
-                }
-            )
-        if self.inexact.size:
-            within = self.rows.within[self.inexact]
-            for sign in (1.0, -1.0):
-                constraints.append(
-                    {
-                        "type": "ineq",
-                        "fun": lambda u, sign=sign: 1.0 - sign * self.at(u)[0][self.inexact] / within,
-                        "jac": lambda u, sign=sign: -sign * self.at(u)[1][self.inexact] / within[:, None],
-                    }
-                )
+    def end(self, joints: Floats, low: Floats, high: Floats, iterations: int) -> tuple[Floats, int, bool]:
+        """Where a search from these joints ends, its iterations, and whether it converged."""
         found = minimize(
-            lambda u: 0.5 * float(u[:c] @ u[:c]),
-            self.begin(joints),
-            jac=lambda u: weight * u,
-            bounds=list(zip([*-ones, *low], [*ones, *high], strict=True)),
-            constraints=constraints,
-            method="SLSQP",
-            options={"maxiter": iterations, "ftol": 1e-10},
+            self.value,
+            joints,
+            jac=True,
+            bounds=list(zip(low, high, strict=True)),
+            method="L-BFGS-B",
+            options={"maxiter": iterations, "ftol": 1e-12, "gtol": 1e-7},
         )
-        return np.clip(found.x[c:], low, high), int(found.nit), bool(found.success)
-
-    def nearest(self, joints: Floats, low: Floats, high: Floats, iterations: int) -> tuple[Floats, int, bool]:
-        """Joints, iterations and success of a search for the least misses."""
-        ones, c = self.limits / self.size, self.c
-        within = self.rows.within[self.inexact]
-        scale = self.rows.scale(self.rows.unit(self.system.unit_jets(self.rows.points, joints, 1)), self.limits)
-        size = scale[self.inexact]
-
-        def miss(u: Floats) -> Floats:
-            value = self.at(u)[0]
-            beyond = np.sign(value[self.inexact]) * np.maximum(np.abs(value[self.inexact]) - within, 0.0)
-            return np.concatenate([self.exact @ value, beyond / size])
-
-        def slope(u: Floats) -> Floats:
-            value, full = self.at(u)
-            active = np.abs(value[self.inexact]) > within
-            return np.vstack([self.exact @ full, full[self.inexact] * (active / size)[:, None]])
-
-        lower, upper = np.concatenate([-ones, low]), np.concatenate([ones, high])
-        start = np.clip(self.begin(joints), lower + 1e-9 * (upper - lower), upper - 1e-9 * (upper - lower))
-        start = np.where(np.isfinite(start), start, 0.0)
-        found = least_squares(miss, start, slope, (lower, upper), max_nfev=iterations, x_scale="jac")
-        return np.clip(found.x[c:], low, high), int(found.nfev), bool(found.status > 0)
+        return np.clip(found.x, low, high), int(found.nit), bool(found.success)

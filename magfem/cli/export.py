@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from magfem.cli.console import show_result
 from magfem.cli.outputs import output_file
 from magfem.cli.parser import CommandLine
+from magfem.cli.systems import add_joints, means_a_system, stated_joints
 from magfem.errors import InputError
 from magfem.units import quantity, quoted
 
@@ -81,6 +82,7 @@ def add(commands: CommandLine) -> None:
     )
     parser.add_argument("--tolerance", metavar="REL", type=float, help="mpem: largest relative error (default: 0.01)")
     parser.add_argument("--points", metavar="P.csv", help="vtu, samples: where (default: 2560 points of the region)")
+    add_joints(parser)
     parser.add_argument("--gradient", action="store_true", help="samples: with the nine components of the gradient")
 
 
@@ -89,7 +91,7 @@ def run(options: Namespace) -> int:
     target = TARGETS[options.to]
     path = output_file(options.output, [target.ending])
     _check_options(options, target)
-    if target.of_coils and _means_a_system(options.model):
+    if target.of_coils and means_a_system(options.model):
         source, name, unit = _system(options)
     else:
         from magfem.fitting import load_model
@@ -115,17 +117,6 @@ def _check_options(options: Namespace, target: Target) -> None:
             raise InputError(f"--{name} is for {users}, not for {options.to}")
 
 
-def _means_a_system(text: str) -> bool:
-    """Whether MODEL is a coil system: a system card, a system or MPEM file, or a name that no model has."""
-    from magfem.actuation.load import READERS, SECTION
-    from magfem.actuation.system_file import is_system_file
-    from magfem.geometry.catalogue import names
-
-    if text.endswith(".json"):  # models are, too
-        return is_system_file(Path(text))
-    return Path(text).suffix in READERS or text in set(names(SECTION, ".toml")) - set(names("fits", ".json"))
-
-
 def _system(options: Namespace) -> tuple[Any, str, str]:
     """The system, its name and unit."""
     from magfem.actuation import load_system
@@ -133,6 +124,7 @@ def _system(options: Namespace) -> tuple[Any, str, str]:
     if options.current is not None:
         raise InputError("--current is for one coil's model, and this is a coil system")
     system = load_system(options.model)
+    stated_joints(system, options)
     return system, system.name, "T/A"
 
 
@@ -201,6 +193,7 @@ def _samples(field: Field, path: Path, options: Namespace) -> dict[str, Any]:
 
 
 def _mpem(source: Field | CoilSystem, path: Path, options: Namespace) -> dict[str, Any]:
+    from magfem.actuation import CoilSystem
     from magfem.actuation.mpem_export import TOLERANCE, write_mpem
     from magfem.fields.workspace_region import Box
 
@@ -208,7 +201,10 @@ def _mpem(source: Field | CoilSystem, path: Path, options: Namespace) -> dict[st
     if not 0 < tolerance < math.inf:
         raise InputError(f"--tolerance must be a positive number, got {tolerance}")
     workspace = None if options.bounds is None else Box(*_bounds(options.bounds))
-    done = write_mpem(source, path, workspace, tolerance)
+    joints = stated_joints(source, options) if isinstance(source, CoilSystem) else None
+    if joints is None and options.joint:
+        raise InputError("--joint is for coil systems, and this is one coil's model")
+    done = write_mpem(source, path, workspace, tolerance, joints=joints)
     count = f"{done.sources} source{'s' * (done.sources != 1)}"
     residual = f"fitted, relative error of B at most {done.maximum:.1e}, {done.rms:.1e} RMS"
     return {
@@ -240,7 +236,7 @@ TARGETS: dict[str, Target] = {
     "magpylib": Target(_magpylib, ".py"),
     "mat": Target(_mat, ".mat"),
     "c": Target(_c, ".h", frozenset({"name"})),
-    "mpem": Target(_mpem, ".yaml", frozenset({"bounds", "tolerance"}), of_coils=True),
+    "mpem": Target(_mpem, ".yaml", frozenset({"bounds", "tolerance", "joint"}), of_coils=True),
     "vti": Target(_vti, ".vti", frozenset({"grid", "bounds"})),
     "vtu": Target(_vtu, ".vtu", frozenset({"points"})),
     "samples": Target(_samples, ".csv", frozenset({"points", "gradient"})),

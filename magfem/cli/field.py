@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from magfem.cli.console import show_result
 from magfem.cli.outputs import output_file
 from magfem.cli.parser import CommandLine
+from magfem.cli.systems import add_joints, means_a_system, stated_currents, stated_joints
 from magfem.errors import InputError
 from magfem.units import quoted
 
@@ -28,14 +29,18 @@ def add(commands: CommandLine) -> None:
         "x,y,z in m (or x_mm,y_mm,z_mm, in any unit of length), in the device's frame: origin in its middle, z\n"
         "along its axis. Writes x,y,z,Bx,By,Bz and, with --gradient, dBx_dx,dBx_dy,...,dBz_dz, in m, T and T/m.\n"
         "A name is a field model if there is one, else a device card. A coil's field is per ampere in every circuit,\n"
-        "in T/A and T/m/A, unless --current says what flows.",
+        "in T/A and T/m/A, unless --current says what flows. A coil system (a card, a system or MPEM file, or a name)\n"
+        "is evaluated at the currents of its coils, zero where --current says nothing, and at its joints.",
         [
             "magfem field planar_coil_12mm --points points.csv -o field.csv --current 0.5",
             "magfem field ring.json --points points.csv -o field.csv --gradient --outside nan",
             "magfem field stator_1.6x5.5 --points p.csv -o f.csv --current inner=0.1 --current outer=-0.05",
+            'magfem field bigmag --points p.csv -o f.csv --current 0=2 --current 3=-5 --joint "gamma_top=30 deg"',
         ],
     )
-    parser.add_argument("target", metavar="MODEL|CARD", help="field model or device card: a name or a path")
+    parser.add_argument(
+        "target", metavar="MODEL|CARD|SYSTEM", help="field model, device card or coil system: a name or a path"
+    )
     parser.add_argument("--points", metavar="P.csv", required=True, help="where")
     parser.add_argument("-o", "--output", metavar="F.csv", required=True, help="the field there")
     parser.add_argument("--gradient", action="store_true", help="with the nine components of the gradient")
@@ -50,8 +55,9 @@ def add(commands: CommandLine) -> None:
         "--current",
         metavar="[NAME=]A",
         action="append",
-        help="a coil's current in A: one value, or once for every circuit that carries one",
+        help="a coil's current in A: one value, or once for every circuit or coil that carries one",
     )
+    add_joints(parser)
 
 
 def run(options: Namespace) -> int:
@@ -62,7 +68,12 @@ def run(options: Namespace) -> int:
 
     currents = _currents(options.current or [])
     points = read_points(Path(options.points))
-    field = _driven(_field(options.target, bool(currents)), currents)
+    if means_a_system(options.target):
+        field = _system_field(options, currents)
+    elif options.joint:
+        raise InputError("--joint is for coil systems whose coils move")
+    else:
+        field = _driven(_field(options.target, bool(currents)), currents)
     order = 1 if options.gradient else 0
     B, *gradient = field.jet(points, order, options.outside)
     write_text(path, field_text(points, B, *gradient))
@@ -72,6 +83,14 @@ def run(options: Namespace) -> int:
         print("the field is that of 1 A in every circuit; --current gives it in T", file=sys.stderr)
     show_result(options, f"{what} at {len(points)} points in {path}", data)
     return 0
+
+
+def _system_field(options: Namespace, currents: dict[str, float]) -> Field:
+    """The field of a coil system at its currents and joints."""
+    from magfem.actuation import load_system
+
+    system = load_system(options.target)
+    return system.at(stated_currents(system, currents), stated_joints(system, options))
 
 
 def _field(target: str, driven: bool) -> Field:

@@ -1,4 +1,4 @@
-"""`magfem show`: a device before any computation."""
+"""`magfem show`: a device before any computation, or a coil system."""
 
 from __future__ import annotations
 
@@ -9,6 +9,9 @@ from typing import TYPE_CHECKING, Any
 from magfem.cli.console import listing, moment_text, show_result
 from magfem.cli.outputs import output_file
 from magfem.cli.parser import CommandLine
+from magfem.cli.show_system import show_system
+from magfem.cli.systems import add_joints, means_a_system
+from magfem.errors import InputError
 from magfem.units import format_quantity
 
 if TYPE_CHECKING:
@@ -23,21 +26,28 @@ def add(commands: CommandLine) -> None:
     parser = commands.add(
         "show",
         run,
-        "a picture and the derived numbers of a device, no solve",
+        "a picture and the derived numbers of a device or coil system, no solve",
         "Reads a device card, prints the numbers that follow from it (volume, moment, length of a coil's wire,\n"
-        "region of the model, ...) and draws the device: magnets with their poles, coils with their current.",
+        "region of the model, ...) and draws the device: magnets with their poles, coils with their current.\n"
+        "Of a coil system it lists coils, joints and what it can do at the middle of its workspace.",
         [
             "magfem show ring_magnet_4x1.5x1",
             "magfem show planar_coil_12mm -o coil.png",
             "magfem show ./mine.toml --json",
+            'magfem show bigmag --joint "gamma_top=30 deg"',
         ],
     )
-    parser.add_argument("card", metavar="CARD", help="device card: a name or a path")
+    parser.add_argument("card", metavar="CARD|SYSTEM", help="device card or coil system: a name or a path")
     parser.add_argument("-o", "--output", metavar="PNG", help="the picture (default: CARD.png, here)")
+    add_joints(parser)
 
 
 def run(options: Namespace) -> int:
     """Print the device's numbers and draw it."""
+    if means_a_system(options.card):
+        return show_system(options)
+    if options.joint:
+        raise InputError("--joint is for coil systems whose coils move")
     from magfem.geometry import load_geometry
 
     geometry = load_geometry(options.card)

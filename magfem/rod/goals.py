@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from magfem.errors import InputError
+from magfem.rod.cross_matrix import cross_matrix
 from magfem.rod.sections import three
 from magfem.typing import ArrayLike, Floats, Points
 
@@ -110,7 +111,7 @@ def _slope(count: int, magnet: int, shift: Floats | None = None, turn: Floats | 
 def _direction_error(wanted: Floats, axis: Floats) -> tuple[Floats, Floats]:
     """(2,) and its derivative (2, 3) by a turn of `axis`."""
     d = wanted / np.linalg.norm(wanted)
-    D = _cross(d)
+    D = cross_matrix(d)
     t1 = D[:, np.argmin(np.abs(d))]  # d × the axis that is farthest from it
     t1 = t1 / np.linalg.norm(t1)
     T = np.stack([t1, D @ t1])
@@ -127,20 +128,15 @@ def _direction_error(wanted: Floats, axis: Floats) -> tuple[Floats, Floats]:
         factor = theta / sine
         change = (cosine * theta / sine - 1) / sine**2  # d(θ / sin θ)/d cos θ
     by_axis = factor * T + change * np.outer(flat, d)
-    return factor * flat, by_axis @ -_cross(axis)
+    return factor * flat, by_axis @ -cross_matrix(axis)
 
 
 def _inverse_left_jacobian(e: Floats) -> Floats:
     """Of the rotation vector of exp([δ]×) exp([e]×) by δ, (3, 3)."""
     theta = float(np.linalg.norm(e))
-    E = _cross(e)
+    E = cross_matrix(e)
     if theta < 1e-4:
         return np.eye(3) - 0.5 * E + E @ E / 12
     half = theta / 2
     inverse: Floats = np.eye(3) - 0.5 * E + (1 - half / np.tan(half)) / theta**2 * E @ E
     return inverse
-
-
-def _cross(a: Floats) -> Floats:
-    x, y, z = a
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

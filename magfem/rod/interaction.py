@@ -14,6 +14,7 @@ import numpy as np
 
 from magfem.errors import InputError
 from magfem.fields.field import Field
+from magfem.rod.cross_matrix import cross_matrix
 from magfem.typing import Floats, Points
 
 
@@ -36,7 +37,7 @@ class Interaction:
                 if i != j:
                     energy += self._add_pair(i, j, R, p, wrench, tangent)
         for k in range(count):
-            tangent[k, :3, k, :3] -= 0.5 * _cross(wrench[k, :3])
+            tangent[k, :3, k, :3] -= 0.5 * cross_matrix(wrench[k, :3])
         return energy, wrench, tangent
 
     def _add_pair(self, i: int, j: int, R: Floats, p: Points, wrench: Floats, tangent: Floats) -> float:
@@ -50,18 +51,18 @@ class Interaction:
         force, torque = G.T @ mu, np.cross(mu, B)
         own = np.zeros((6, 6))  # ∂w_i/∂x_i
         own[:3, :3] = np.outer(mu, B) - (mu @ B) * np.eye(3)
-        own[:3, 3:] = _cross(mu) @ G
-        own[3:, :3] = -G.T @ _cross(mu)
+        own[:3, 3:] = cross_matrix(mu) @ G
+        own[3:, :3] = -G.T @ cross_matrix(mu)
         own[3:, 3:] = F
         carry = np.eye(6)  # x_i of a motion x_j of the whole pair
-        carry[3:, :3] = -_cross(p[i] - p[j])
+        carry[3:, :3] = -cross_matrix(p[i] - p[j])
         w = np.concatenate([torque, force])
         turned = np.zeros((6, 6))  # of w_i when all turns
-        turned[:3, :3], turned[3:, :3] = -_cross(torque), -_cross(force)
+        turned[:3, :3], turned[3:, :3] = -cross_matrix(torque), -cross_matrix(force)
         other = turned - own @ carry  # ∂w_i/∂x_j
         # w_j = −carryᵀ w_i; carryᵀ holds (p_i − p_j) × force, which moves with both.
         lever_i, lever_j = np.zeros((6, 6)), np.zeros((6, 6))
-        lever_i[:3, 3:], lever_j[:3, 3:] = -_cross(force), _cross(force)
+        lever_i[:3, 3:], lever_j[:3, 3:] = -cross_matrix(force), cross_matrix(force)
         wrench[i] += w
         wrench[j] -= carry.T @ w
         tangent[i, :, i, :] -= own
@@ -88,8 +89,3 @@ def interaction_of(fields: Sequence[Field | None], moments: Floats) -> Interacti
     return Interaction(
         tuple(DipoleField(moment) if one is None else one for one, moment in zip(fields, moments, strict=True)), moments
     )
-
-
-def _cross(a: Floats) -> Floats:
-    x, y, z = a
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

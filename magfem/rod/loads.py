@@ -9,11 +9,10 @@ import numpy as np
 
 from magfem.rod.applied_field import AppliedField
 from magfem.rod.chain import Chain
+from magfem.rod.cross_matrix import cross_matrix
 from magfem.rod.interaction import Interaction
 from magfem.rod.load_kernel import field_points, node_loads
 from magfem.typing import Floats, Integers, Jet, Points
-
-_ZERO = np.zeros(3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,9 +151,3 @@ class Loads:
 
 
 _NOTHING: Jet = (np.empty((0, 3)), np.empty((0, 3, 3)), np.empty((0, 3, 3, 3)))
-
-
-def cross_matrix(a: Floats) -> Floats:
-    """[a]×, (3, 3)."""
-    x, y, z = a
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

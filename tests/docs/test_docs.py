@@ -44,6 +44,19 @@ EXPECTED = {
     "coil-systems.md": [
         ("abs(rows[:, :3] @ currents - B).max() / abs(B).max()", 0.0, 1e-12),
         ("abs(field.B(points) - B).max() / abs(B).max()", 0.0, 1e-12),
+        ("abs(standing.B(points, currents) - turned).max() / abs(turned).max()", 0.0, 1e-12),
+        (  # a coil of the air kind, 80 mm along its axis; after a quarter turn it lies at (10, −80) mm
+            "gantry.B([0.01, 0, 0], [1.0], [0.01, np.pi / 2])[1] / sum(f * a / 0.08**n for n, f, a in ("
+            "(3, 2, 6.422646756191394e-07), (4, -6, 1.870831551827318e-08), (5, 24, 1.7460902399025802e-10), "
+            "(6, -120, 5.183775351972603e-13)))",
+            1.0,
+            1e-12,
+        ),
+        ("found.torque @ pose.rotation.apply(moment) / np.linalg.norm(found.torque)", 0.0, 1e-12),
+        ("least.met and even.met and even.peak < least.peak and least.norm < even.norm", True, 0),
+        ("abs(along.conditioning.lost[0, 0]) * (along.outcome == 'impossible')", 1.0, 1e-9),
+        ("planned.met and planned.norm <= find_currents(bigmag, magnet, angles).norm", True, 0),
+        ("np.all(reach.field_everywhere <= reach.field_best) and reach.field_best.max() < 8 * 6 * 3e-3", True, 0),
         # Published: B_x = Σ a_k (−1)^{k+1} (k+1)!/x^{k+2} on the axis of the air-cored coil; both point the same way.
         (
             "pair.B([0, 0, 0], [1, -1])[0] / (2 * sum(f * a / 0.08**n for n, f, a in ("
