@@ -124,6 +124,10 @@ def calibrate(
     Raises InputError for what cannot be told: coils whose currents depend on each other, a background that is like the
     currents, too few positions or rows.
     """
+    if prior is not None and prior.joints:
+        raise InputError(
+            f"the coils of {prior.name} move: give prior=system.fixed(joints), at the joint values of the measurement"
+        )
     names = _names(samples.coils, coil_names, prior)
     positions, place = places(samples)
     check_samples(samples, positions, names, background)

@@ -28,6 +28,7 @@ _ROUNDING = 1e-11  # of the energy: smaller changes say nothing
 _ESCAPES = 8
 _SETTLED = 1e-2  # of the tolerance: a step that turns and shifts by less has nothing to mend
 _AT_HAND = 1e-2  # rad, of any cross-section
+_NEAR = 1e-3  # rad, of the residual
 _SLOW = 30  # damped steps after which the lowest eigenvector is tried
 _BLOCKED = 12  # steps in a row that the edge of what is allowed has shortened
 
@@ -110,7 +111,8 @@ def find_equilibrium(
             damping = 0.0
             continue
         if system.negative:
-            damping = max(4 * damping, 1e-3) if damping else NEUTRAL
+            neutral = not damping and system.residual < _NEAR  # perhaps only a turn that nothing resists
+            damping = NEUTRAL if neutral else max(4 * damping, 1e-3)
             continue
         step, moved = system.step(-system.gradient)
         slope = float(np.vdot(system.gradient, step))

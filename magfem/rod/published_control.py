@@ -1,11 +1,11 @@
 """The dissertation's own orientation controller (2.2.3–2.2.7, Algorithm 1), kept as a baseline for `steering`.
 
-Every step: the magnets' wrenches at the measured poses (2.11–2.16); the shape under them (2.2.1, `shooting`); a Jacobian
-by finite differences, one boundary value problem for every current and joint, the wrenches still at the measured poses;
-a PI controller on angle and axis of rotation (2.20); and the truncated pseudo-inverse (2.21, 2.22). Two properties that
-`steering` does not have come with the coordinates: the arc cosine's slope is infinite where a magnet points along the
-global z, where the axis of rotation is lost; and 1 − k_d·k has no slope at the goal, so that its row of the Jacobian
-fades as the goal is neared.
+Every step: the magnets' wrenches at the measured poses (2.11–2.16); the shape under them (2.2.1, `shooting`); a
+Jacobian by finite differences, one boundary value problem for every current and joint, the wrenches still at the
+measured poses; a PI controller on angle and axis of rotation (2.20); the truncated pseudo-inverse (2.21, 2.22). Two
+properties that `steering` does not have come with the coordinates: the arc cosine's slope is infinite where a magnet
+points along the global z, where its axis of rotation is lost; and 1 − k_d·k has no slope at the goal, so that the goal
+is neared ever more slowly.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from magfem.actuation.wrench import field_to_wrench
 from magfem.errors import InputError
 from magfem.rod.goals import Goal, GoalError, goal_error
 from magfem.rod.rod import Rod
@@ -38,10 +39,10 @@ The published controller does not notice anything else: it runs on where a goal 
 class PublishedSteering:
     """Where the published controller is.
 
-    currents (c,) A, joints (j,) rad or m.  base_wrench: (6,) ξ of the last shape.  wrench: (m, 6) torque and force that
-    it was found under.  summed: (2g,) the integrated errors.  error: of the last measurement, as `steering` measures it.
-    orientation_error: (2g,) eq. 2.20.  jacobian: (2g, c + j) eq. 2.19.  condition: its largest over its smallest singular
-    value.  iterations: of Levenberg–Marquardt, all boundary value problems of the last step.
+    currents (c,) A, joints (j,) rad or m.  base_wrench: (6,) ξ of the last shape.  wrench: (m, 6) force and torque
+    that it was found under.  summed: (2g,) the integrated errors.  error: of the last measurement, as `steering`
+    measures it.  orientation_error: (2g,) eq. 2.20.  jacobian: (2g, c + j) eq. 2.19.  condition: its largest over its
+    smallest singular value.  iterations: of Levenberg–Marquardt, all boundary value problems of the last step.
     """
 
     currents: Floats
@@ -68,12 +69,12 @@ class PublishedController:
     """The published controller; `begin` and `advance` as `steering.Controller` has them.
 
     rod, system: the model of the plant; all magnets' fields are taken at their centres.  goals: directions, at most one
-    for a magnet.  gravity: (3,) m/s².  current_difference, joint_difference: dI and dθ of Algorithm 1, A, and rad or m.
-    proportional, integral: the PI controller's coefficients, per step; the dissertation has found its own by trial and
-    does not state them.  reset: rad of an angle's error below which its integrated term is set to zero; an axis's is set
-    to zero below 1 − cos `reset`.  current_limit, joint_limits: as `steering.Controller` has them; what exceeds them is
-    clipped.  largest_condition: of eq. 2.22.  informed: whether guesses are informed, eq. 2.17.  tolerance: rad at which
-    the goals count as reached.  flexible_steps, rigid_steps, threshold: of `shooting.Shooting`.
+    for a magnet.  gravity: (3,) m/s².  current_difference, joint_difference: dI and dθ of Algorithm 1, A, and rad or
+    m.  proportional, integral: the PI controller's coefficients, per step; the dissertation has found its own by trial
+    and does not state them.  reset: rad of an angle's error below which its integrated term is set to zero; an axis's
+    is below 1 − cos `reset`.  current_limit, joint_limits: as `steering.Controller` has them; what exceeds them is
+    clipped.  largest_condition: of eq. 2.22.  informed: whether guesses are informed, eq. 2.17.  tolerance: rad at
+    which the goals count as reached.  flexible_steps, rigid_steps, threshold: of `shooting.Shooting`.
 
     Joints count in rad in the pseudo-inverse, currents in A: a least norm depends on the units, and the dissertation
     does not state them.
@@ -85,8 +86,8 @@ class PublishedController:
     gravity: ArrayLike = (0.0, 0.0, -9.81)
     current_difference: float = 0.2
     joint_difference: float = float(np.radians(2.0))
-    proportional: float = 0.3
-    integral: float = 0.0
+    proportional: float = 0.8
+    integral: float = 0.01
     reset: float = float(np.radians(1.0))
     current_limit: float | None = 8.0
     joint_limits: ArrayLike | None = None
@@ -95,7 +96,7 @@ class PublishedController:
     tolerance: float = float(np.radians(0.05))
     flexible_steps: int = 16
     rigid_steps: int = 2
-    threshold: float = 1e-8
+    threshold: float = 1e-6
 
     def __post_init__(self) -> None:
         if any(goal.direction is None or goal.position is not None for goal in self.goals):
@@ -144,7 +145,7 @@ class PublishedController:
         amperes = np.zeros(len(self.system.coils)) if currents is None else np.array(currents, dtype=float)
         values = np.zeros(len(self.system.joints)) if joints is None else np.array(joints, dtype=float)
         none = np.zeros((len(self.rod.magnets), 6))
-        shape = self.statics.solve(none[:, 3:], none[:, :3])
+        shape = self.statics.solve(none[:, :3], none[:, 3:])
         return PublishedSteering(
             currents=amperes,
             joints=values,
@@ -207,11 +208,17 @@ class PublishedController:
         here = self._rows(shape)
         columns, iterations = [], 0
         map_here = self.current_to_wrench(positions, frames, now.joints)
-        changes = [(map_here[:, :, j] * self.current_difference, self.current_difference) for j in range(len(now.currents))]
+        changes = [
+            (map_here[:, :, j] * self.current_difference, self.current_difference) for j in range(len(now.currents))
+        ]
         for j in range(len(now.joints)):
             moved = now.joints.copy()
             # at a joint's upper limit the difference is taken downwards
-            h = self.joint_difference if moved[j] + self.joint_difference <= self._highest_joints[j] else -self.joint_difference
+            h = (
+                self.joint_difference
+                if moved[j] + self.joint_difference <= self._highest_joints[j]
+                else -self.joint_difference
+            )
             moved[j] += h
             changes.append(((self.current_to_wrench(positions, frames, moved) - map_here) @ now.currents, h))
         for change, h in changes:
@@ -223,7 +230,7 @@ class PublishedController:
         return np.stack(columns, axis=1), iterations
 
     def current_to_wrench(self, positions: Points, frames: Floats, joints: Floats) -> Floats:
-        """T = T_µ T_β, eqs. 2.12–2.16: (m, 6, c), torque (N·m/A), then force (N/A) of every magnet."""
+        """T = T_µ T_β, eqs. 2.12–2.16: (m, 6, c), force (N/A), then torque (N·m/A) of every magnet."""
         moments = np.einsum("mij,mj->mi", frames, self._own_moments)
         fields = self.system.unit_fields(positions, joints, outside="extrapolate")
         wrenches: Floats = field_to_wrench(moments) @ fields
@@ -234,7 +241,7 @@ class PublishedController:
         guess = base_wrench
         if self.informed:
             guess = informed_guess(base_wrench, wrench - before, positions - self.rod.base.translation)
-        return self.statics.solve(wrench[:, 3:], wrench[:, :3], guess)
+        return self.statics.solve(wrench[:, :3], wrench[:, 3:], guess)
 
     def _rows(self, shape: ShotShape) -> Floats:
         """(2g,) k_d·k and φ of the theoretical shape, whose differences are eq. 2.18."""
@@ -260,8 +267,8 @@ class PublishedController:
 def axis_angle(tangents: Vectors, wanted_axes: Vectors, keep_sign: bool = False) -> tuple[Vectors, Floats]:
     """Axes k (n, 3) and angles φ (n,) rad that turn the global z to the tangents (n, 3), eq. 2.10.
 
-    φ is an arc cosine. Of ±k, ±φ those are taken whose axis is nearer to the wanted one (n, 3), or with `keep_sign` those
-    of positive φ. Along z any axis would do: the wanted one is taken.
+    φ is an arc cosine. Of ±k, ±φ those are taken whose axis is nearer to the wanted one (n, 3), or with `keep_sign`
+    those of positive φ. Along z any axis would do: the wanted one is taken.
     """
     x, y, z = np.moveaxis(tangents / np.linalg.norm(tangents, axis=-1, keepdims=True), -1, 0)
     angles = np.arccos(np.clip(z, -1.0, 1.0))
@@ -273,27 +280,15 @@ def axis_angle(tangents: Vectors, wanted_axes: Vectors, keep_sign: bool = False)
     return sign[:, None] * axes, sign * angles
 
 
-def field_to_wrench(moments: Vectors) -> Floats:
-    """T_µ, eqs. 2.14 and 2.15: (m, 6, 8) from B and the five gradients to torque, then force, of moments (m, 3) A·m²."""
-    x, y, z = moments.T
-    T = np.zeros((len(moments), 6, 8))
-    T[:, 0, 1], T[:, 0, 2] = -z, y
-    T[:, 1, 0], T[:, 1, 2] = z, -x
-    T[:, 2, 0], T[:, 2, 1] = -y, x
-    T[:, 3, 3], T[:, 3, 4], T[:, 3, 5] = x, y, z
-    T[:, 4, 4], T[:, 4, 6], T[:, 4, 7] = x, y, z
-    T[:, 5, 3], T[:, 5, 5], T[:, 5, 6], T[:, 5, 7] = -z, x, -z, y
-    return T
-
-
 def informed_guess(base_wrench: Floats, change: Floats, arms: Points) -> Floats:
-    """ξ (6,) after the wrenches (m, 6), torque and force, change at `arms` (m, 3) m from the base, eq. 2.17."""
-    torque, force = change[:, :3], change[:, 3:]
-    return base_wrench + np.concatenate([force.sum(axis=0), (torque + np.cross(arms, force)).sum(axis=0)])
+    """ξ (6,) after the wrenches (m, 6), force and torque, change at `arms` (m, 3) m from the base, eq. 2.17."""
+    force, torque = change[:, :3], change[:, 3:]
+    guess: Floats = base_wrench + np.concatenate([force.sum(axis=0), (torque + np.cross(arms, force)).sum(axis=0)])
+    return guess
 
 
 def truncated_inverse(J: Floats, largest_condition: float) -> tuple[Floats, float]:
-    """The pseudo-inverse without singular values below the largest over `largest_condition`, eq. 2.22; the condition."""
+    """The pseudo-inverse without singular values below the largest over `largest_condition`, eq. 2.22; condition."""
     U, sigma, Vt = np.linalg.svd(J, full_matrices=False)
     kept = sigma * largest_condition >= sigma[0] if sigma[0] > 0 else np.zeros(sigma.size, dtype=bool)
     condition = float(sigma[0] / sigma[-1]) if sigma[-1] > 0 else np.inf

@@ -76,7 +76,7 @@ class Shooting:
     gravity: ArrayLike = (0.0, 0.0, -9.81)
     flexible_steps: int = 16
     rigid_steps: int = 2
-    threshold: float = 1e-8
+    threshold: float = 1e-6
     most_iterations: int = 60
 
     def __post_init__(self) -> None:
@@ -84,7 +84,9 @@ class Shooting:
             if type(value) is not int or value < 1:
                 raise InputError(f"shooting: {name} must be a whole number above 0, got {value!r}")
         if self.rigid_steps % 2:
-            raise InputError(f"shooting: rigid_steps must be even, for a point at the magnet's centre, got {self.rigid_steps}")
+            raise InputError(
+                f"shooting: rigid_steps must be even, for a point at the magnet's centre, got {self.rigid_steps}"
+            )
         if self.rod.magnet_fields is not None:
             raise InputError("shooting knows no forces between the rod's magnets: leave magnet_fields out")
         for one in self.rod.sections:

@@ -109,6 +109,26 @@ def test_least_squares_obeys_its_optimality_conditions(bigmag):
     assert found.outcome == "limited" and found.active and found.converged
 
 
+def test_what_any_currents_do_is_met_by_no_larger_ones(bigmag, extended):
+    """Currents, places, joints and targets at random: least norm and peak never exceed their origins."""
+    rng = np.random.default_rng(9)
+    for k in range(80):
+        system = (bigmag, extended)[k % 2]
+        point, joints, moment = rng.uniform(-0.03, 0.03, 3), rng.uniform(-3, 3, 2), rng.normal(scale=0.03, size=3)
+        own = np.clip(8 * rng.uniform(-1, 1, len(system.coils)) * 10 ** rng.uniform(-4, 0.3), -8, 8)
+        pose = RigidTransform.from_translation(point)
+        force, torque = system.wrench(moment, pose, own, joints)
+        targets = [
+            Target(point, field=system.B(point, own, joints)),
+            Target(pose, moment=moment, torque=torque, force=force),
+            Target(pose, moment=moment, torque=torque, force=force + 1e-3, within={"force": 2e-3}),
+            [Target(one, field=system.B(one, own, joints)) for one in (point, -point)],
+        ][k % 4]
+        shortest, lowest = (find_currents(system, targets, joints, method) for method in ("least_norm", "least_peak"))
+        assert shortest.met and shortest.norm <= np.linalg.norm(own) * (1 + 1e-7)
+        assert lowest.met and lowest.peak <= np.abs(own).max() * (1 + 1e-6)
+
+
 @pytest.mark.parametrize("method", METHODS)
 def test_what_limits_forbid_is_said(bigmag, method):
     target = Target(PLACE, field=[0.2, 0, 0])

@@ -184,6 +184,20 @@ def test_values_computed_to_lie_on_a_limit_are_allowed(chain):
     chain.B(POINTS, AMPERES, [0.03 * (1 + 1e-14), -2.0, 1.0])
 
 
+def test_a_prior_that_moves_is_fixed_first():
+    from magfem.actuation import calibrate
+    from magfem.samples import SystemSamples
+
+    bigmag, joints, rng = magfem.load_system("bigmag"), [0.4, -0.2], np.random.default_rng(3)
+    points = bigmag.workspace.random_points(rng, 40).repeat(8, axis=0)
+    driven = rng.uniform(-7, 7, (320, 6))
+    samples = SystemSamples(points, driven, bigmag.B(points, driven * 1.05, joints, outside="extrapolate"), sigma=1e-6)
+    with pytest.raises(InputError, match=r"the coils of BigMag.* move: give prior=system.fixed\(joints\)"):
+        calibrate(samples, prior=bigmag)
+    found = calibrate(samples, prior=bigmag.fixed(joints), correct=False)
+    np.testing.assert_allclose([one["gain"] for one in found.report["gains"]], 1.05, rtol=1e-3)
+
+
 def test_systems_that_stand_still_refuse_joints():
     with pytest.raises(InputError, match="this system has no joints"):
         magfem.load_system("octomag").B([0, 0, 0], np.ones(8), [0.1])
