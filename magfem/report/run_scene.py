@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.patches import Patch
 
+from magfem.actuation import CoilSystem, SystemCoil
 from magfem.fields.hull import CylinderHull
 from magfem.fields.region import PlacedRegion, Shell
 from magfem.report.figures.style import COPPER, GREY, NORTH, SOUTH, Picture, drawing, figure, png
@@ -25,7 +26,7 @@ def rods_picture(run: Run) -> Picture:
 
     chosen = shown_steps(run)
     reach = max(float(np.linalg.norm(run.steps[k].plant, axis=1).max()) for k in chosen)
-    bodies = coil_bodies(run)
+    bodies = coil_bodies(run.system.fixed(run.steps[chosen[-1]].joints))
     near = [float(np.linalg.norm(centre)) for centre, *_ in bodies]
     wide = View(*_frame(), half=1.25 * max([reach, *near]) + 1.5 * _COIL_LENGTH)
     close = View(*_frame(), half=1.25 * reach)
@@ -58,10 +59,10 @@ def _frame() -> tuple[Floats, Floats, Floats]:
     return shared.right, shared.up, shared.towards
 
 
-def coil_bodies(run: Run) -> list[tuple[Floats, Floats, float, float]]:
-    """Centre (3,) m, axis (3,), outer radius and length (m) of every coil at joint values zero."""
+def coil_bodies(system: CoilSystem) -> list[tuple[Floats, Floats, float, float]]:
+    """Centre (3,) m, axis (3,), outer radius and length (m) of every coil where it stands."""
     found = []
-    for coil in run.system.coils:
+    for coil in system.coils:
         turn = coil.pose.rotation.as_matrix()
         hull = _hull(coil)
         if hull is not None:
@@ -72,7 +73,7 @@ def coil_bodies(run: Run) -> list[tuple[Floats, Floats, float, float]]:
     return found
 
 
-def _hull(coil: Any) -> CylinderHull | None:
+def _hull(coil: SystemCoil) -> CylinderHull | None:
     region = coil.own_region
     if isinstance(region, PlacedRegion):
         region = region.region
