@@ -25,7 +25,7 @@ def magnet_angles(field, modulus: float, guess, forces: bool = True):
 
     def flexible(y):
         def slope(_, y):
-            x, z, theta, fx, fz, m = y
+            theta, fx, fz, m = y[2:]
             # m' = −(t × n)_y, n' = weight upwards, as the rest of the rod is lighter further out
             tx, tz = np.sin(theta), np.cos(theta)
             return [tx, tz, m / stiffness, 0.0, weight, -(tz * fx - tx * fz)]

@@ -108,5 +108,3 @@ def test_a_rod_without_magnets_cannot_be_steered():
 def test_an_unknown_name_is_answered_with_the_nearest():
     with pytest.raises(InputError, match="steer_planar"):
         load_scenario("steer_planer")
-
-
