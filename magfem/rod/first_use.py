@@ -13,12 +13,16 @@ from pathlib import Path
 import numpy as np
 
 from magfem.compiled import cache_folder
+from magfem.fields.uniform_field import UniformField
 from magfem.rod.applied_field import AppliedField
+from magfem.rod.load_kernel import field_loads
 from magfem.rod.rod import Rod
 from magfem.rod.sections import FlexibleSection, MagnetSection
 
 _STATEMENT = "from magfem.rod.first_use import compile_kernels; compile_kernels()"
 _PATIENCE = 120  # s: whatever is not compiled by then is compiled here
+
+_NO_DIPOLES = (np.zeros(0, dtype=np.int64), np.zeros((0, 3)), np.zeros((0, 3)))
 
 _ready = False
 
@@ -54,17 +58,12 @@ def compile_kernels() -> None:
     rod = Rod(
         [FlexibleSection(length=1.0, radius=0.1, youngs_modulus=1.0, elements=2), MagnetSection(length=0, moment=1)]
     )
-    rod.solve(_NoField(), gravity=(0, 0, 0)).sensitivity("moment")
+    state = rod.solve(UniformField((0.0, 0.0, 0.0)), gravity=(0, 0, 0))
+    state.sensitivity("moment")
+    field_loads(*_NO_DIPOLES, state.frames, np.zeros((0, 0, 3)), np.zeros((0, 0, 3, 3)), np.zeros((1, 6, 0)))
     mark = _mark()
     if mark is not None:
         mark.touch()
-
-
-class _NoField:
-    """Zero everywhere, without a kernel of its own."""
-
-    def jet(self, points: np.ndarray, order: int = 1, outside: str = "raise") -> tuple[np.ndarray, ...]:
-        return tuple(np.zeros((len(points), *(3,) * rank)) for rank in (1, 2, 3))[: order + 1]
 
 
 def _mark() -> Path | None:
