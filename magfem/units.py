@@ -56,6 +56,7 @@ DIMENSIONS: dict[str, Dimension] = {
     "time": Dimension("time", "s", "10 ms"),
     "mass": Dimension("mass", "kg", "2 g", symbol="g", scale=1e-3),
     "density": Dimension("density", "kg/m^3", "7500 kg/m^3", symbol="kg/m³", prefixes=False),
+    "acceleration": Dimension("acceleration", "m/s^2", "9.81 m/s^2", symbol="m/s²", prefixes=False),
     "force": Dimension("force", "N", "5 mN"),
     "torque": Dimension("torque", "N*m", "1 mN m", symbol="N·m"),
     "pressure": Dimension("pressure", "Pa", "2 MPa"),

@@ -82,7 +82,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_list_names_everything_in_the_catalogue(tmp_path: Path) -> None:
     names = run_json("list", cwd=tmp_path)
-    assert set(names) == {"cards", "systems", "models", "recipes", "reports"}
+    assert set(names) == {"cards", "systems", "models", "recipes", "reports", "scenarios"}
     assert names["cards"] == sorted(path.stem for path in (CHECKOUT / "geometries").glob("*.toml"))
     assert names["systems"] == sorted(path.stem for path in (CHECKOUT / "geometries" / "systems").glob("*.toml"))
     out, err = run("list", cwd=tmp_path)

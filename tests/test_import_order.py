@@ -65,10 +65,16 @@ def test_the_order_names_every_part_and_has_no_circle() -> None:
 
 def test_the_order_is_the_one_that_was_meant() -> None:
     """Fields know nothing of geometry, solvers nothing of fits, fits nothing of what uses them."""
-    chain = ("errors", "fields", "geometry", "mesh", "fem", "fitting", "actuation", "exchange", "cli")
+    chain = ("errors", "fields", "geometry", "mesh", "fem", "fitting", "actuation", "rod", "scenario", "report", "cli")
     for left, right in pairwise(chain):
         assert left in LEFT[right] and right not in LEFT[left]
-    for one, other in (("exchange", "report"), ("samples", "fem"), ("samples", "mesh"), ("closed_form", "fem")):
+    for one, other in (
+        ("exchange", "report"),
+        ("exchange", "rod"),
+        ("samples", "fem"),
+        ("samples", "mesh"),
+        ("closed_form", "fem"),
+    ):
         assert one not in LEFT[other] and other not in LEFT[one]
 
 

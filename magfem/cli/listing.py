@@ -17,8 +17,11 @@ SECTIONS = (
     ("models", "field models", "fits", ".json"),
     ("recipes", "fit recipes", "fits", ".toml"),
     ("reports", "report recipes", "reports", ".toml"),
+    ("scenarios", "scenarios", "reports", ".toml"),
 )
 """Key in the JSON, heading, folder and ending of everything that has a name."""
+
+_SCENARIO = "scenario"  # the kind of recipe that shares its folder with reports
 
 
 def add(commands: CommandLine) -> None:
@@ -27,8 +30,8 @@ def add(commands: CommandLine) -> None:
         "list",
         run,
         "cards, coil systems, fitted models and recipes it knows",
-        "Lists the names that other commands understand: device cards, coil systems, fitted field models and\n"
-        "recipes, each with its description.",
+        "Lists the names that other commands understand: device cards, coil systems, fitted field models,\n"
+        "recipes and scenarios, each with its description.",
         ["magfem list", "magfem list --json"],
     )
 
@@ -38,8 +41,11 @@ def run(options: Namespace) -> int:
     from magfem.geometry.catalogue import folder, names
 
     found = {key: names(section, suffix) for key, _, section, suffix in SECTIONS}
+    scenarios = {name for name in found["scenarios"] if _entry(folder("reports") / f"{name}.toml", "kind") == _SCENARIO}
+    found["scenarios"] = tuple(name for name in found["scenarios"] if name in scenarios)
+    found["reports"] = tuple(name for name in found["reports"] if name not in scenarios)
     text = "\n\n".join(
-        f"{heading}:\n" + listing([(name, _description(folder(section) / f"{name}{suffix}")) for name in found[key]])
+        f"{heading}:\n" + listing([(name, _entry(folder(section) / f"{name}{suffix}", "name")) for name in found[key]])
         for key, heading, section, suffix in SECTIONS
         if found[key]
     )
@@ -47,11 +53,11 @@ def run(options: Namespace) -> int:
     return 0
 
 
-def _description(file: Path) -> str:
-    """The `name` that a card, model or recipe gives itself."""
+def _entry(file: Path, key: str) -> str:
+    """What a card, model or recipe says of itself at `key`, such as its `name`; empty when it does not."""
     try:
         text = file.read_text(encoding="utf-8")
         content: Any = json.loads(text) if file.suffix == ".json" else tomllib.loads(text)
-        return str(content["name"])
+        return str(content[key])
     except (OSError, ValueError, LookupError, TypeError):
         return ""

@@ -20,7 +20,7 @@ _NOUNS = {
     ("geometries/systems", ".toml"): "coil system",
     ("fits", ".toml"): "fit recipe",
     ("fits", ".json"): "field model",
-    ("reports", ".toml"): "report recipe",
+    ("reports", ".toml"): "recipe",
 }
 
 

@@ -27,6 +27,8 @@ def load_recipe(name_or_path: str | os.PathLike[str]) -> Recipe:
 
 def recipe_from_table(table: Table) -> Recipe:
     """Read a whole recipe file."""
+    if table.values.get("kind") == "scenario":
+        raise table.error("this is a scenario: magfem simulate runs it, and writes its page", "kind")
     table.only("device", "title", "measurement")
     return Recipe(
         device=table.text("device"),

@@ -51,7 +51,7 @@ def bounded_step(
         kept = sigma > sigma[0] / largest_condition if sigma[0] > 0 else np.zeros(sigma.size, dtype=bool)
         rank = int(np.count_nonzero(kept))
         if round_ == 0:
-            condition = float(sigma[0] / sigma[-1]) if sigma[-1] > 0 else np.inf
+            condition = float(sigma[0] / sigma[-1]) if sigma[-1] > 1e-300 * sigma[0] else np.inf
         U, sigma, Vt = U[:, kept], sigma[kept], Vt[kept]
         rest = wanted - J[:, fixed] @ x[fixed]
         part = Vt.T @ (sigma / (sigma**2 + damping**2) * (U.T @ rest))

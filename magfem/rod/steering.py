@@ -201,7 +201,9 @@ class Controller:
         """One step along the route, as far as rates allow; the model goes along, or is solved anew where it cannot."""
         low, high = self._room(now.parameters)
         left = (now.route[0] - now.parameters) / self.scale
-        part = min(1.0, float(np.min(np.where(left < 0, low, high) / np.where(left == 0, np.inf, left), initial=1.0)))
+        there_already = np.abs(left) < 1e-12  # such as joints that are held still: they do not hold up the others
+        shares = np.where(left < 0, low, high) / np.where(there_already, 1.0, left)
+        part = float(np.min(np.where(there_already, 1.0, shares), initial=1.0))
         there = now.parameters + part * left * self.scale
         where = (self.system, there[: self.coils], there[self.coils :])
         rod, model = now.model.rod, now.model
