@@ -16,6 +16,7 @@ from magfem.rod.centreline import Centreline
 from magfem.rod.centreline_fit import adopted, enough, finite, in_company, rod_of, rough_shape, walked
 from magfem.rod.curve_fit import Task, farthest_from, fit_curve, nearest_of, nearest_places
 from magfem.rod.moving_frame import smallest_turn
+from magfem.threads import one_thread_for_algebra
 from magfem.typing import ArrayLike, Booleans, Floats, Integers, Points, Vectors
 
 _NODES = 60  # of the line through each picture's pixels, along which the pictures are matched
@@ -86,6 +87,7 @@ class CameraPixels:
         return max(farthest_from(self.values[a:b][used[a:b]], c.project(points)) for c, (a, b) in parts)
 
 
+@one_thread_for_algebra()
 def fit_centreline_to_views(
     cameras: Sequence[Camera],
     pixels: Sequence[ArrayLike],

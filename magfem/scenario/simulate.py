@@ -18,6 +18,7 @@ from magfem.scenario.scenario import Scenario
 from magfem.scenario.scenario_file import load_scenario
 from magfem.scenario.targets import RandomTargets, drawn
 from magfem.scenario.torque_only import without_force
+from magfem.threads import one_thread_for_algebra
 from magfem.typing import Points, Vectors
 from magfem.version import __version__
 
@@ -42,11 +43,12 @@ def simulate(scenario: Scenario | str | os.PathLike[str]) -> Run:
         targets = drawn(targets, rod, system, scenario.gravity, scenario.planar)
     log.info("scenario: steering %d magnets by %d coils", len(rod.magnets), len(system.coils))
     plant = Plant(rod, system, scenario.gravity)
-    steps, endings, missed = close_loop(scenario, system, plant, targets)
     torque_only = None
-    if scenario.compare_forces:
-        log.info("scenario: the same currents without magnetic force")
-        torque_only = _without_forces(plant, steps)
+    with one_thread_for_algebra():
+        steps, endings, missed = close_loop(scenario, system, plant, targets)
+        if scenario.compare_forces:
+            log.info("scenario: the same currents without magnetic force")
+            torque_only = _without_forces(plant, steps)
     return Run(
         scenario=scenario,
         system=system,
