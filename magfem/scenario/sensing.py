@@ -8,13 +8,15 @@ from typing import Protocol
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
-from magfem.errors import ConvergenceError
+from magfem.errors import ConvergenceError, InputError
 from magfem.rod.camera_views import fit_centreline_to_views, simulate_views
 from magfem.rod.cameras import Camera
 from magfem.rod.centreline import Centreline
 from magfem.rod.magnet_pose import magnet_poses
 from magfem.rod.state import RodState
 from magfem.typing import Floats, Points
+
+_SHOWN = 0.9  # of a picture's true pixels: a curve that explains fewer is not the rod
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,13 +78,11 @@ class Cameras:
             for _ in range(self.pictures)
         ]
         pixels = [np.concatenate([view[c].pixels for view in views]) for c in range(len(self.cameras))]
-        start = None if before is None else before.centreline
         try:
-            fitted = self._fitted(plant, pixels, start)
-        except ConvergenceError:
-            if start is None:
-                raise
-            fitted = self._fitted(plant, pixels, None)
+            fitted = self._fitted(plant, pixels, None if before is None else before.centreline)
+        except ConvergenceError:  # anew, at first from one picture of each camera: a cold start takes long
+            first = self._fitted(plant, [view.pixels for view in views[0]], None)
+            fitted = self._fitted(plant, pixels, first)
         middle = plant.arc_lengths[plant.loads.chain.magnet_node]
         poses = magnet_poses(fitted, middle, plant.rod.base.rotation)
         return Seen(poses.positions, poses.rotations.as_matrix(), fitted)
@@ -90,16 +90,22 @@ class Cameras:
     def _fitted(self, plant: RodState, pixels: list[Floats], start: Centreline | None) -> Centreline:
         """The centreline in the pictures; of the plant only what is known of the rod without load is used."""
         base = plant.rod.base
-        return fit_centreline_to_views(
-            self.cameras,
-            pixels,
-            plant.rod.length,
-            base.translation,
-            base_tangent=base.rotation.as_matrix()[:, 2],
-            straight=_rigid_stretches(plant),
-            degree=self.degree,
-            start=start,
-        )
+        try:
+            found = fit_centreline_to_views(
+                self.cameras,
+                pixels,
+                plant.rod.length,
+                base.translation,
+                base_tangent=base.rotation.as_matrix()[:, 2],
+                straight=_rigid_stretches(plant),
+                degree=self.degree,
+                start=start,
+            )
+        except InputError as error:  # the pictures were taken: it is the fit that went behind a camera
+            raise ConvergenceError(f"the cameras do not find the rod: {error}") from None
+        if found.used.mean() < _SHOWN * (1 - self.outliers):
+            raise ConvergenceError("the cameras do not find the rod: the curve found leaves out much of the pictures")
+        return found
 
     def describe(self) -> str:
         """In a few words."""

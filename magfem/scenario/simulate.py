@@ -37,15 +37,15 @@ def simulate(scenario: Scenario | str | os.PathLike[str]) -> Run:
     if system is None:
         assert isinstance(scenario.system, str)
         system = load_system(scenario.system)
-    rod = stiffened(scenario.rod, scenario.stiffness)
-    targets = scenario.targets
-    if isinstance(targets, RandomTargets):
-        targets = drawn(targets, rod, system, scenario.gravity, scenario.planar)
-    log.info("scenario: steering %d magnets by %d coils", len(rod.magnets), len(system.coils))
-    plant = Plant(rod, system, scenario.gravity)
-    torque_only = None
     with one_thread_for_algebra():
+        rod = stiffened(scenario.rod, scenario.stiffness)
+        targets = scenario.targets
+        if isinstance(targets, RandomTargets):
+            targets = drawn(targets, rod, system, scenario.gravity, scenario.planar)
+        log.info("scenario: steering %d magnets by %d coils", len(rod.magnets), len(system.coils))
+        plant = Plant(rod, system, scenario.gravity)
         steps, endings, missed = close_loop(scenario, system, plant, targets)
+        torque_only = None
         if scenario.compare_forces:
             log.info("scenario: the same currents without magnetic force")
             torque_only = _without_forces(plant, steps)
