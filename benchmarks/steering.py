@@ -6,8 +6,8 @@ plant is 15 % stiffer than both controllers' model and measured exactly. A targe
 below 0.1°, in at most 400 steps. The process keeps to one core and counts its processor time; targets take turns
 between the controllers, so that a busy machine disturbs all alike.
 
-Ours keeps its rates of 0.4 A and 2° a step, which the published controller does not have, and runs once more without. The published PI coefficients are not
-stated: all pairs of `GAINS` run, and the best pair is the one that is compared.
+Ours keeps its rates of 0.4 A and 2° a step, which the published controller does not have, and runs once more without.
+The published PI coefficients are not stated: all pairs of `GAINS` run, and the best pair is the one that is compared.
 """
 
 from __future__ import annotations

@@ -39,7 +39,7 @@ def summing_kernel(function: Function) -> Function:
 
 
 def _compile(function: Function, fastmath: Any) -> Function:
-    folder = _cache_folder()
+    folder = cache_folder()
     config: Any = numba.config
     previous, config.CACHE_DIR = config.CACHE_DIR, str(folder or "")
     try:
@@ -69,7 +69,7 @@ event.register("numba:compile", _Announcement())  # type: ignore[no-untyped-call
 
 
 @cache
-def _cache_folder() -> Path | None:
+def cache_folder() -> Path | None:
     """Where compiled kernels are kept; None when no place can be written that nobody else may write to."""
     package = Path(__file__).parent
     digest = hashlib.sha256(numba.__version__.encode())

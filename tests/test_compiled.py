@@ -26,9 +26,9 @@ def homeless(tmp_path, monkeypatch):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr(Path, "home", no_home)
     monkeypatch.setattr(compiled.tempfile, "gettempdir", lambda: str(tmp_path))
-    compiled._cache_folder.cache_clear()
+    compiled.cache_folder.cache_clear()
     yield tmp_path / f"magfem-{os.getuid()}"
-    compiled._cache_folder.cache_clear()
+    compiled.cache_folder.cache_clear()
 
 
 def double(x):
@@ -36,7 +36,7 @@ def double(x):
 
 
 def test_without_a_home_a_private_temporary_folder_serves(homeless):
-    assert compiled._cache_folder().parent == homeless
+    assert compiled.cache_folder().parent == homeless
     assert stat.S_IMODE(homeless.stat().st_mode) == 0o700 and homeless.stat().st_uid == os.getuid()
 
 
@@ -59,7 +59,7 @@ def test_a_folder_that_others_may_write_is_not_used(prepare, homeless, tmp_path,
     prepare(homeless, tmp_path / "elsewhere")
     with caplog.at_level(logging.WARNING, logger="magfem"):
         kernels = [compiled.kernel(double), compiled.kernel(double)]
-    assert compiled._cache_folder() is None
+    assert compiled.cache_folder() is None
     assert len(caplog.records) == 1 and "compiled anew in every process" in caplog.text
     assert all(kernel(np.float64(1.5)) == 3 for kernel in kernels)
 
@@ -69,4 +69,4 @@ def test_a_folder_of_another_user_is_not_used(homeless, monkeypatch):
     user = os.getuid()
     homeless.rename(homeless.with_name(f"magfem-{user + 1}"))
     monkeypatch.setattr(os, "getuid", lambda: user + 1)
-    assert compiled._cache_folder() is None
+    assert compiled.cache_folder() is None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -13,9 +14,10 @@ from magfem.errors import ConvergenceError, InputError
 from magfem.rod.cameras import Camera, triangulate
 from magfem.rod.centreline import Centreline
 from magfem.rod.centreline_fit import adopted, enough, finite, in_company, rod_of, rough_shape, walked
-from magfem.rod.curve_fit import Task, fit_curve, nearest_of, nearest_places
+from magfem.rod.curve_fit import Task, farthest_from, fit_curve, nearest_of, nearest_places
 from magfem.rod.moving_frame import smallest_turn
-from magfem.typing import ArrayLike, Floats, Integers, Points, Vectors
+from magfem.threads import one_thread_for_algebra
+from magfem.typing import ArrayLike, Booleans, Floats, Integers, Points, Vectors
 
 _NODES = 60  # of the line through each picture's pixels, along which the pictures are matched
 _BENDS, _WAYS, _BEST = (0.6, 1.2, 2.0, 2.8), 8, 4  # arcs to start from: how far bent, in how many directions, how many
@@ -79,7 +81,13 @@ class CameraPixels:
         parts = zip(self.cameras, pairwise(self.ends), strict=True)
         return np.concatenate([nearest_of(self.values[start:end], c.project(points)) for c, (start, end) in parts])
 
+    def gap(self, points: Points, used: Booleans) -> float:
+        """In the picture where it is largest."""
+        parts = zip(self.cameras, pairwise(self.ends), strict=True)
+        return max(farthest_from(self.values[a:b][used[a:b]], c.project(points)) for c, (a, b) in parts)
 
+
+@one_thread_for_algebra()
 def fit_centreline_to_views(
     cameras: Sequence[Camera],
     pixels: Sequence[ArrayLike],
@@ -117,19 +125,15 @@ def fit_centreline_to_views(
     if start is not None:
         c = adopted(start, task)
         return fit_curve(task, c, nearest_places(task, task.curve(c)), rough=False)
-    found: Centreline | None = None
+    fits: list[Centreline] = []
     for c in _starts(task, cameras, seen):
-        try:
-            fitted = fit_curve(task, c, nearest_places(task, task.curve(c)), rough=True)
-        except (ConvergenceError, InputError, np.linalg.LinAlgError):
-            continue
-        if found is None or fitted.used.mean() / fitted.noise > found.used.mean() / found.noise:
-            found = fitted
-    if found is None:
+        with suppress(ConvergenceError, InputError, np.linalg.LinAlgError):
+            fits.append(fit_curve(task, c, nearest_places(task, task.curve(c)), rough=True))
+    if not fits:
         raise ConvergenceError(
             "views: no centreline of this length fits half of the pixels; a start nearby or fewer outliers would help"
         )
-    return found
+    return max(fits, key=lambda fit: float(np.mean(fit.used)) / (fit.noise + 1e-300))
 
 
 def match_lines(cameras: Sequence[Camera], lines: Sequence[Floats]) -> tuple[Integers, Integers]:

@@ -23,7 +23,8 @@ class Centreline:
     base: (3,) m.  base_tangent: unit (3,), or None where it was free.  coefficients: (K, 3) m.  covariance: (3K, 3K)
     m², of `coefficients.ravel()`, from the residuals of the fit; zeros when there was none.  noise: standard
     deviation of the data, one coordinate, in their unit (m; pixels for views).  used: which data the fit kept.
-    iterations: of the fit.
+    gap: how far the curve strays from the nearest of them, in their unit: a stretch that was not seen, or, in pictures,
+    a rod that points into a camera, whose end nothing holds.  iterations: of the fit.
 
     Methods take arc lengths (...,) m between 0 and the rod's length and raise InputError outside.
     """
@@ -35,6 +36,7 @@ class Centreline:
     covariance: Floats
     noise: float = 0.0
     used: Booleans = field(default_factory=lambda: np.ones(0, bool))
+    gap: float = 0.0
     iterations: int = 0
 
     def __repr__(self) -> str:
@@ -141,8 +143,8 @@ class Centreline:
         speed = np.linalg.norm(first, axis=-1)[:, None, None]
         t = first / speed[:, 0]
         turn = (np.eye(3) - t[:, :, None] * t[:, None, :]) / speed
-        found: Floats = (turn @ self._spread(self.basis.functions(arc.ravel(), 1)) @ turn).reshape(*arc.shape, 3, 3)
-        return found
+        found = turn @ self._spread(self.basis.functions(arc.ravel(), 1)) @ turn
+        return np.asarray(found.reshape(*arc.shape, 3, 3))
 
     def _spread(self, functions: Floats) -> Floats:
         count = functions.shape[1]
@@ -156,7 +158,7 @@ class Centreline:
         margin = 1e-9 * self.length
         if not np.all((arc >= -margin) & (arc <= self.length + margin)):
             raise InputError(f"centreline: arc lengths must lie between 0 and the rod's length {self.length:g} m")
-        return np.clip(arc, 0.0, self.length)
+        return np.asarray(np.clip(arc, 0.0, self.length))
 
     def _bent(self, first: Vectors, binormal: Vectors) -> Floats:
         size: Floats = np.linalg.norm(binormal, axis=-1)

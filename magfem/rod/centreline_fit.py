@@ -10,6 +10,7 @@ from magfem.errors import InputError
 from magfem.rod.centreline import Centreline
 from magfem.rod.centreline_basis import centreline_basis
 from magfem.rod.curve_fit import PointCloud, Task, fit_curve, nearest_places
+from magfem.threads import one_thread_for_algebra
 from magfem.typing import ArrayLike, Booleans, Floats, Points
 
 if TYPE_CHECKING:
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 _NEIGHBOURS = (10, 40)  # along which a cloud is walked; more when too few points are reached
 
 
+@one_thread_for_algebra()
 def fit_centreline(
     points: ArrayLike,
     length: float,

@@ -1,15 +1,14 @@
 """Least squares of a centreline to data whose places along the rod are known, or are found along.
 
 Data are points, or pixels of cameras: anything with a position that the curve's own position maps to. Where places are
-unknown only the distance across the curve counts, in the data's own space (Gauss–Newton on the distance to the tangent;
-each datum's place moves along with the curve), and the rod's length holds: |p'| = 1 is fitted as well, weighted so
-that a stretch of 1 weighs like a shift of all data by `STIFFNESS` lengths. Without it nothing would hold the tip.
+unknown only the distance from the curve counts, in the data's own space (each datum's place moves along with the
+curve), and the rod's length holds: |p'| = 1 is fitted as well, weighted so that a stretch of 1 weighs like a shift of
+all data by `STIFFNESS` lengths. Without it nothing would hold the tip.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -18,9 +17,10 @@ from magfem.errors import ConvergenceError, InputError
 from magfem.rod.centreline import Centreline
 from magfem.rod.centreline_basis import CentrelineBasis
 from magfem.rod.robust_scale import TUNING, biweight, biweight_spread, scale_of
-from magfem.typing import Floats, Integers, Points
+from magfem.typing import Booleans, Floats, Integers, Points, Vectors
 
 STIFFNESS, _COLD = 0.05, 1.0  # the latter on the way from a start far off
+_SAMPLES = 97
 _STEPS, _PATIENCE = 100, 30
 _ROUGH_STEPS = {True: 8, False: 2}  # with weights 1/r, before Tukey's, from a start far off or near
 _FARTHEST = 0.1  # of the length, that a datum's place moves in one step: where a rod points into a camera it would leap
@@ -47,6 +47,10 @@ class Data(Protocol):
         """(n,) which of points (m, 3) m is seen nearest to each datum."""
         ...
 
+    def gap(self, points: Points, used: Booleans) -> float:
+        """How far the farthest of points (m, 3) m is seen from the nearest of the data used (n,)."""
+        ...
+
 
 @dataclass(frozen=True)
 class PointCloud:
@@ -62,6 +66,10 @@ class PointCloud:
         """By distance in space."""
         return nearest_of(self.values, points)
 
+    def gap(self, points: Points, used: Booleans) -> float:
+        """In space."""
+        return farthest_from(self.values[used], points)
+
 
 def nearest_of(data: Floats, candidates: Floats) -> Integers:
     """(n,) which of the candidates (m, d) is nearest to each datum (n, d)."""
@@ -69,6 +77,13 @@ def nearest_of(data: Floats, candidates: Floats) -> Integers:
     shifted = candidates - middle
     found: Integers = np.argmin(np.sum(shifted**2, axis=-1) - 2 * (data - middle) @ shifted.T, axis=1)
     return found
+
+
+def farthest_from(data: Floats, points: Floats) -> float:
+    """How far the farthest of points (m, d) is from the nearest of data (n, d); infinite without data."""
+    if not len(data):
+        return np.inf
+    return float(np.linalg.norm(points - data[nearest_of(points, data)], axis=-1).max())
 
 
 @dataclass(frozen=True)
@@ -96,9 +111,9 @@ class Task:
         return Centreline(self.basis, self.base, self.base_tangent, coefficients, np.zeros((size, size)))
 
 
-def nearest_places(task: Task, curve: Centreline, samples: int = 97) -> Floats:
-    """Arc lengths (n,) m, to one part in `samples`, at which the curve passes nearest to each datum."""
-    s = np.linspace(0.0, curve.length, samples)
+def nearest_places(task: Task, curve: Centreline) -> Floats:
+    """Arc lengths (n,) m, to about a hundredth of the length, at which the curve passes nearest to each datum."""
+    s = np.linspace(0.0, curve.length, _SAMPLES)
     return s[task.data.nearest(curve.position(s))]
 
 
@@ -115,6 +130,7 @@ def fit_curve(task: Task, coefficients: Floats | None, s: Floats, rough: bool) -
     free = 1 - min(c.size, coordinates * len(data) - 1) / (coordinates * len(data))
     rough_left = _ROUGH_STEPS[rough] if task.robust else 0
     scale, limit = np.inf, np.inf
+    before: Floats = np.zeros(c.shape)
     again = True  # once: were the scale to follow the weights at every step, it could shrink for ever
     for iteration in range(1, _STEPS + 1):
         near = _linearised(task, c, s)
@@ -125,7 +141,11 @@ def fit_curve(task: Task, coefficients: Floats | None, s: Floats, rough: bool) -
                 scale, limit = found, TUNING[coordinates] * found
             weight = 1 / np.maximum(near.lengths / scale, 0.3) if rough_left > 0 else biweight(near.lengths, limit)
         hessian, rhs, _ = _equations(task, c, near, weight, _COLD if rough_left > 0 else STIFFNESS)
-        step = np.linalg.solve(hessian, rhs.ravel()).reshape(c.shape)
+        step = np.asarray(np.linalg.solve(hessian, rhs.ravel()).reshape(c.shape))
+        size = float(np.linalg.norm(step))
+        if np.sum(step * before) < 0 and size > 0.5 * float(np.linalg.norm(before)):
+            step *= 0.5  # to and fro
+        before = step
         c = c + step
         if task.slide:
             moved = np.clip(near.shift - np.sum(near.pull * (near.functions @ step), axis=-1), -_FARTHEST, _FARTHEST)
@@ -135,7 +155,7 @@ def fit_curve(task: Task, coefficients: Floats | None, s: Floats, rough: bool) -
         move = float(rhs.ravel() @ step.ravel()) / noise**2
         rough_left -= 1
         settled = _SETTLED if iteration < _PATIENCE else _NEARLY
-        if rough_left < 0 and (move < settled or np.linalg.norm(step) < 1e-12 * task.basis.length):
+        if rough_left < 0 and (move < settled or size < 1e-12 * task.basis.length):
             if not (task.robust and again and found < _SMALLER * scale):
                 break
             again, scale, limit = False, found, TUNING[coordinates] * found
@@ -149,58 +169,73 @@ def fit_curve(task: Task, coefficients: Floats | None, s: Floats, rough: bool) -
             f"centreline: only {np.mean(kept):.0%} of the data lie on one curve of this length, expected at least half"
         )
     covariance, deviation = _statistics(task, c, near, limit)
-    return Centreline(task.basis, task.base, task.base_tangent, c, covariance, deviation, kept, iteration)
+    gap = task.data.gap(task.curve(c).position(np.linspace(0, task.basis.length, _SAMPLES)), kept)
+    return Centreline(task.basis, task.base, task.base_tangent, c, covariance, deviation, kept, gap, iteration)
 
 
 @dataclass(frozen=True)
 class _Linearised:
-    """Residuals near a curve: `away` (n, d) changes by −across (n, d, 3) times the change of position.
+    """Data near a curve whose position changes.
 
-    lengths: (n,) of the residuals.  functions: (n, K) at the data's places.  shift, pull: by how many lengths of the
+    lengths: (n,) of the residuals.  functions: (n, K) at the data's places.  information: (n, 3, 3) and force (n, 3),
+    what each residual's square is in a change of position, half its second derivative and minus half its first.
+    across: (n, 3, 3), the information in the direction across the curve alone.  shift, pull: by how many lengths of the
     rod each place moves, (n,), and how much less for a change of position, (n, 3); zero where places are known.
-    information: (n, 3, 3), acrossᵀ across.
     """
 
     lengths: Floats
     functions: Floats
-    away: Floats
+    information: Floats
+    force: Vectors
     across: Floats
     shift: Floats
-    pull: Floats
-
-    @cached_property
-    def information(self) -> Floats:
-        found: Floats = np.einsum("nda,ndb->nab", self.across, self.across)
-        return found
+    pull: Vectors
 
 
 def _linearised(task: Task, c: Floats, s: Floats) -> _Linearised:
+    """Places are eliminated by Newton's method: of r² with r = data − seen(p(s)) the half second derivative in s is
+    g = |r'|² − r·r'', so that information and force lose their part along the curve, by viewᵀr' r'ᵀview/g.
+
+    Where −r·r'' is negative it is left out, as by Gauss and Newton. Where it is positive it counts: a picture may bend
+    as sharply as its noise is wide, and without it places would leap (Wang, Pottmann and Liu, Fitting B-spline curves
+    to point clouds by curvature-based squared distance minimization, ACM Trans. Graph. 25, 2006).
+    """
     piece, values = task.basis.local(s)
     functions = np.einsum("nd,ndk->nk", values, task.basis.tables[0, piece])
-    position, slope = np.einsum("nd,jndc->jnc", values, task.curve(c).pieces[:2, piece])
+    position, slope, bend = np.einsum("nd,jndc->jnc", values, task.curve(c).pieces[:3, piece])
     seen, view = task.data.seen(position + task.base)
     away = task.data.values - seen
     lengths = np.sqrt(np.sum(away**2, axis=-1))
+    whole, force = np.einsum("nda,ndb->nab", view, view), np.einsum("nda,nd->na", view, away)
     if not task.slide:
-        return _Linearised(lengths, functions, away, view, np.zeros(len(s)), np.zeros((len(s), 3)))
+        return _Linearised(lengths, functions, whole, force, whole, np.zeros(len(s)), np.zeros((len(s), 3)))
     along = np.einsum("ndc,nc->nd", view, slope) * task.basis.length
+    pull = np.einsum("nd,ndc->nc", along, view)
     speed = np.sum(along**2, axis=-1)
-    shift = np.sum(along * away, axis=-1) / speed
-    pull = np.einsum("nd,ndc->nc", along, view) / speed[:, None]
-    across = view - along[:, :, None] * pull[:, None, :]
-    return _Linearised(lengths, functions, away - along * shift[:, None], across, shift, pull)
+    steep = speed + np.maximum(-np.sum(force * bend, axis=-1) * task.basis.length**2, 0.0)
+    shift = np.sum(along * away, axis=-1) / steep
+    outer = pull[:, :, None] * pull[:, None, :]
+    return _Linearised(
+        lengths,
+        functions,
+        whole - outer / steep[:, None, None],
+        force - pull * shift[:, None],
+        whole - outer / speed[:, None, None],
+        shift,
+        pull / steep[:, None],
+    )
 
 
 def _equations(task: Task, c: Floats, near: _Linearised, weight: Floats, stiff: float) -> tuple[Floats, Floats, Floats]:
     """Gauss–Newton's matrix (3K, 3K), right-hand side (K, 3), and that part of the matrix which holds the length."""
     hessian = _normal_matrix(near.functions, weight[:, None, None] * near.information)
-    rhs = near.functions.T @ (weight[:, None] * np.einsum("nda,nd->na", near.across, near.away))
+    rhs = near.functions.T @ (weight[:, None] * near.force)
     stiffness = np.zeros_like(hessian)
     if task.slide:
         speed = task.basis.slopes @ c + (0.0 if task.base_tangent is None else task.base_tangent)
         size = np.linalg.norm(speed, axis=-1)
         tangent = speed / size[:, None]
-        mean = float(np.einsum("n,naa->", weight, near.information)) / task.coordinates
+        mean = float(np.einsum("n,naa->", weight, near.across)) / task.coordinates
         pressing = mean * (stiff * task.basis.length) ** 2 * task.basis.quadrature[1]
         stiffness = _normal_matrix(task.basis.slopes, pressing[:, None, None] * tangent[:, :, None] * tangent[:, None])
         hessian = hessian + stiffness
@@ -217,7 +252,7 @@ def _statistics(task: Task, c: Floats, near: _Linearised, limit: float) -> tuple
     kept, coordinates = near.lengths < limit, task.coordinates
     square, bend = biweight_spread(near.lengths, limit, coordinates)
     pulled = float(np.mean(biweight(near.lengths[kept], limit) * near.lengths[kept] ** 2))
-    data_part = _normal_matrix(near.functions[kept], near.information[kept])
+    data_part = _normal_matrix(near.functions[kept], near.across[kept])
     stiffness = _equations(task, c, near, kept.astype(float), STIFFNESS)[2]
     whole = bend * data_part + stiffness
     spread = np.linalg.eigvalsh(whole)

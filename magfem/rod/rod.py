@@ -122,6 +122,7 @@ class Rod:
         """
         from magfem.rod.applied_field import applied_field
         from magfem.rod.equilibrium import find_equilibrium, predicted, relax
+        from magfem.rod.first_use import compile_beside
         from magfem.rod.interaction import interaction_of
         from magfem.rod.loads import Loads
         from magfem.rod.state import RodState
@@ -133,13 +134,15 @@ class Rod:
             raise InputError(f"rod: most_iterations must be a whole number from 1, got {most_iterations!r}")
         if guess is not None and not isinstance(guess, RodState):
             raise InputError(f"guess is a RodState that solve returned, got {type(guess).__name__}")
+        applied = applied_field(field)
+        compile_beside(applied)
         chain = self.chain
         interaction = None
         if self.magnet_fields is not None:
             interaction = interaction_of(self.magnet_fields, np.array([one.moment_vector for one in self.magnets]))
         loads = Loads(
             chain,
-            applied_field(field),
+            applied,
             three("rod", "gravity", gravity),
             three("rod", "tip_force", tip_force),
             three("rod", "tip_moment", tip_moment),

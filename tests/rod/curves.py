@@ -49,7 +49,7 @@ def jointed(s, bends, lengths):
             else:
                 x, z = own * np.sin(angle), own * np.cos(angle)
             if which is None:
-                at, angle = at + [x[0], z[0]], turn[0]
+                at, angle = np.array([at[0] + x[0], at[1] + z[0]]), turn[0]
             else:
                 place[which] = np.stack([at[0] + x, 0 * x, at[1] + z], -1)[which]
                 tangent[which] = np.stack([np.sin(turn), 0 * x, np.cos(turn)], -1)[which]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from rod.curves import LENGTH, circle, elastica, helix, jointed
@@ -65,7 +67,7 @@ def test_circle(bend, known):
         found = fit_centreline(place, LENGTH, (0, 0, 0), arc_lengths=S if known else None, degree=degree, robust=False)
         errors.append(degrees_between(found.tangent(S), tangent).max())
     assert errors[-1] < 1e-5
-    assert all(late < early / 20 or late < 1e-6 for early, late in zip(errors, errors[1:], strict=False))
+    assert all(late < early / 20 or late < 1e-6 for early, late in pairwise(errors))
     assert np.allclose(found.curvature(S), bend / LENGTH, rtol=2e-5)
 
 
