@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scenario.recipes import TWO_MAGNETS, with_cameras
@@ -56,6 +58,12 @@ def test_every_scenario_of_the_catalogue_can_be_read():
         except CardError as error:
             assert f'of kind "{KIND}"' in str(error)  # a report recipe
     assert len(found) == len(set(found)) >= 5
+
+
+def test_the_recipe_of_the_documentation_is_one():
+    page = (Path(__file__).parents[2] / "docs" / "steering.md").read_text(encoding="utf-8")
+    recipe = page.split("```toml\n")[1].split("```")[0]
+    assert read(recipe).rod.magnets[0].length == pytest.approx(4e-3)
 
 
 def test_cameras_are_read():
