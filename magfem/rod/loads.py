@@ -72,6 +72,8 @@ class Loads:
         Of a node they follow each other: all six, or the first three where torques are all there is.
         """
         chain = self.chain
+        if self.conservative and self.interaction is None:
+            return _NO_COORDINATES
         turning = set(np.flatnonzero(chain.torque.any(axis=1)).tolist())
         moving: set[int] = set()
         if self.follower and self.tip_force.any():
@@ -150,4 +152,5 @@ class Loads:
         return energy, W
 
 
+_NO_COORDINATES: Integers = np.empty(0, dtype=np.int64)
 _NOTHING: Jet = (np.empty((0, 3)), np.empty((0, 3, 3)), np.empty((0, 3, 3, 3)))
