@@ -35,7 +35,7 @@ has no stable shape to go on to.  unreachable: no way was found on the model, wh
 
 _PROGRESS = 0.02  # of the error: less is no progress
 _ANOTHER_SHAPE = 0.7  # rad between the model's axis and the plant's
-_NOTICEABLE = 0.005  # of the stiffness: less is not worth a new model
+_NOTICEABLE = 0.02  # of the stiffness: less is not worth a new model
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
