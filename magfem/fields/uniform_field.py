@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from magfem.errors import InputError
 from magfem.fields.field import Evaluated, Unit
 from magfem.fields.region import Everywhere, Region
-from magfem.fields.terms import Terms, uniform
 from magfem.typing import ArrayLike, Floats, Jet, Points
+
+if TYPE_CHECKING:
+    from magfem.fields.terms import Terms
 
 
 class UniformField(Evaluated):
@@ -29,6 +33,8 @@ class UniformField(Evaluated):
     @property
     def lowered(self) -> Terms:
         """As sources far away."""
+        from magfem.fields.terms import uniform
+
         return uniform(self.vector)
 
     def evaluate(self, points: Points, order: int) -> Jet:

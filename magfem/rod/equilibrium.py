@@ -13,9 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from magfem.rod import chain_kernel
 from magfem.rod.chain import Chain
-from magfem.rod.factored import NEUTRAL, Factored, Shape, factored, shape_of
+from magfem.rod.factored import NEUTRAL, Factored, Shape, elastic_forces, factored, shape_of
 from magfem.rod.loads import Acting, Loads
 from magfem.typing import Floats, Points
 
@@ -195,7 +194,7 @@ def _leave_saddle(chain: Chain, here: _Point, loads: Loads, at: Callable[[Floats
     z[:, [3, 4, 5, 9, 10, 11]] = 0.0
     moved = np.empty(0)
     for _ in range(12):
-        z, x = system.step(_elastic(chain, z))
+        z, x = system.step(elastic_forces(chain, z))
         moved = x[:, :3]
         z /= np.abs(moved).max()
     best = here
@@ -205,15 +204,6 @@ def _leave_saddle(chain: Chain, here: _Point, loads: Loads, at: Callable[[Floats
             if there.energy < best.energy - 1e-15 * abs(best.energy):
                 best = there
     return best
-
-
-def _elastic(chain: Chain, twist: Floats) -> Floats:
-    """The elastic Hessian times twists (e, 12)."""
-    spring = np.zeros_like(chain.stiffness)
-    spring[chain.flexible] = chain.stiffness[chain.flexible] / chain.length[chain.flexible, None]
-    a, b = twist[:, :6], twist[:, 6:]
-    own, cross = chain_kernel.OWN, chain_kernel.CROSS
-    return np.concatenate([spring * (own * a + cross * b), spring * (own * b + cross * a)], axis=1)
 
 
 def relax(

@@ -170,7 +170,41 @@ class Factored:
         """Eigenvalues below −`NEUTRAL` of the Hessian without damping, in units of the elastic one."""
         if not self.negative:
             return 0
-        return factored(self.chain, self.shape, self.acting, self.coupled, NEUTRAL).negative
+        if self._symmetric:
+            return factored(self.chain, self.shape, self.acting, self.coupled, NEUTRAL).negative
+        return self._creeping_away
+
+    @property
+    def _symmetric(self) -> bool:
+        """Whether the Hessian is one: loads without a potential leave an unsymmetric tangent."""
+        W = self.acting.remainder
+        return W is None or bool(np.abs(W - W.T).max() <= 1e-9 * np.abs(W).max())
+
+    @property
+    def _creeping_away(self) -> int:
+        """Modes in which the overdamped rod K dη/dt = −(unbalanced loads) leaves the shape: its static instability.
+
+        Of K⁻¹H with the unsymmetric H, whose symmetric part need not be positive for that; eigenvalues of H⁻¹K lie on
+        the same sides of the imaginary axis.
+        """
+        links = np.flatnonzero(self.chain.flexible)
+        units = np.zeros((self.chain.links, 12, 12 * links.size))
+        for k, link in enumerate(links):
+            units[link, :, 12 * k : 12 * k + 12] = np.eye(12)
+        answers, _ = self.answer(twist_load=elastic_forces(self.chain, units))
+        modes = np.linalg.eigvals(answers[links].reshape(12 * links.size, -1))
+        return int(np.count_nonzero(modes.real < 0))
+
+
+def elastic_forces(chain: Chain, twist: Floats) -> Floats:
+    """The elastic Hessian times twists (e, 12) or (e, 12, n)."""
+    spring = np.zeros_like(chain.stiffness)
+    spring[chain.flexible] = chain.stiffness[chain.flexible] / chain.length[chain.flexible, None]
+    spring = spring.reshape(*spring.shape, *(1,) * (twist.ndim - 2))
+    a, b = twist[:, :6], twist[:, 6:]
+    own, cross = chain_kernel.OWN, chain_kernel.CROSS
+    forces: Floats = np.concatenate([spring * (own * a + cross * b), spring * (own * b + cross * a)], axis=1)
+    return forces
 
 
 def factored(chain: Chain, shape: Shape, acting: Acting, coupled: Integers, damping: float = 0.0) -> Factored:

@@ -6,6 +6,7 @@ two processes are ready in little more than half the time.
 
 from __future__ import annotations
 
+import logging
 import subprocess
 import sys
 from pathlib import Path
@@ -14,10 +15,12 @@ import numpy as np
 
 from magfem.compiled import cache_folder
 from magfem.fields.uniform_field import UniformField
-from magfem.rod.applied_field import AppliedField
+from magfem.rod.applied_field import AppliedField, DrivenField
 from magfem.rod.load_kernel import field_loads
 from magfem.rod.rod import Rod
 from magfem.rod.sections import FlexibleSection, MagnetSection
+
+log = logging.getLogger("magfem")
 
 _STATEMENT = "from magfem.rod.first_use import compile_kernels; compile_kernels()"
 _PATIENCE = 120  # s: whatever is not compiled by then is compiled here
@@ -36,13 +39,14 @@ def compile_beside(applied: AppliedField | None) -> None:
     mark = _mark()
     if mark is None or mark.exists() or not sys.executable:
         return
+    log.info("first use on this machine: compiling the kernels of rods, once, about 20 s")
     command = [sys.executable, "-c", _STATEMENT]
     try:
         process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     except OSError:
         return
     try:
-        if applied is not None:
+        if isinstance(applied, DrivenField):  # another field may be of any kind, and is the user's
             applied.jets(np.zeros((1, 3)))
         process.wait(_PATIENCE)
     except subprocess.TimeoutExpired:

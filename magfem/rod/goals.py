@@ -13,6 +13,8 @@ from magfem.rod.cross_matrix import cross_matrix
 from magfem.rod.sections import three
 from magfem.typing import ArrayLike, Floats, Points
 
+_OPPOSITE = 0.05  # rad: an axis nearer to the opposite of a goal is turned as if it were so far from it
+
 POSITION_SCALE = 0.05
 """m that weigh as much as one rad."""
 
@@ -33,6 +35,10 @@ class Goal:
     def __post_init__(self) -> None:
         if self.direction is None and self.rotation is None and self.position is None:
             raise InputError("a goal needs a direction, a rotation or a position")
+        if isinstance(self.magnet, bool) or not isinstance(self.magnet, int | np.integer):
+            raise InputError(f"goal: magnet must be a whole number, counted from 0, got {self.magnet!r}")
+        if self.rotation is not None and not (isinstance(self.rotation, Rotation) and self.rotation.single):
+            raise InputError("goal: rotation must be one scipy.spatial.transform.Rotation")
         if self.direction is not None and self.rotation is not None:
             raise InputError("a goal has either a direction or a rotation")
         if self.direction is not None and not np.linalg.norm(three("goal", "direction", self.direction)) > 0:
@@ -78,8 +84,7 @@ def goal_error(goals: Sequence[Goal], positions: Points, frames: Floats) -> Goal
             raise InputError(f"a goal is for magnet {goal.magnet}, and the rod has {count}, counted from 0")
         angle = distance = 0.0
         if goal.direction is not None:
-            vector, derivative = _direction_error(np.asarray(goal.direction, float), frames[goal.magnet, :, 2])
-            angle = float(np.linalg.norm(vector))
+            vector, derivative, angle = _direction_error(np.asarray(goal.direction, float), frames[goal.magnet, :, 2])
             rows.append(vector)
             slopes.append(_slope(count, goal.magnet, turn=derivative))
         if goal.rotation is not None:
@@ -108,8 +113,8 @@ def _slope(count: int, magnet: int, shift: Floats | None = None, turn: Floats | 
     return slope
 
 
-def _direction_error(wanted: Floats, axis: Floats) -> tuple[Floats, Floats]:
-    """(2,) and its derivative (2, 3) by a turn of `axis`."""
+def _direction_error(wanted: Floats, axis: Floats) -> tuple[Floats, Floats, float]:
+    """(2,), its derivative (2, 3) by a turn of `axis`, and the angle, rad."""
     d = wanted / np.linalg.norm(wanted)
     D = cross_matrix(d)
     t1 = D[:, np.argmin(np.abs(d))]  # d × the axis that is farthest from it
@@ -117,18 +122,18 @@ def _direction_error(wanted: Floats, axis: Floats) -> tuple[Floats, Floats]:
     T = np.stack([t1, D @ t1])
     flat = T @ axis
     cosine, sine = float(d @ axis), float(np.linalg.norm(flat))
-    theta = float(np.arctan2(sine, cosine))
+    angle = theta = float(np.arctan2(sine, cosine))
+    if cosine < 0 and sine < _OPPOSITE:  # any way round is as good: take the one begun, or the first
+        flat = flat * (_OPPOSITE / sine) if sine > 0 else np.array([_OPPOSITE, 0.0])
+        sine, cosine = _OPPOSITE, -float(np.sqrt(1 - _OPPOSITE**2))
+        theta, axis = float(np.arctan2(sine, cosine)), flat @ T + cosine * d
     if sine < 1e-4:
-        # θ / sin θ = 1 + θ²/6; opposite to the goal, any way round is as good: take the first.
-        if cosine < 0:
-            flat = np.array([max(sine, 1e-4), 0.0]) if sine == 0 else flat * max(1.0, 1e-4 / sine)
-            sine = float(np.linalg.norm(flat))
-        factor, change = (1.0, -1 / 3) if cosine > 0 else (theta / sine, 0.0)
+        factor, change = 1.0, -1 / 3  # θ / sin θ = 1 + θ²/6
     else:
         factor = theta / sine
         change = (cosine * theta / sine - 1) / sine**2  # d(θ / sin θ)/d cos θ
     by_axis = factor * T + change * np.outer(flat, d)
-    return factor * flat, by_axis @ -cross_matrix(axis)
+    return factor * flat, by_axis @ -cross_matrix(axis), angle
 
 
 def _inverse_left_jacobian(e: Floats) -> Floats:

@@ -12,8 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from magfem.errors import InputError
+from magfem.errors import InputError, OutsideRegionError
 from magfem.fields.field import Field
+from magfem.fields.region import Shell
 from magfem.rod.cross_matrix import cross_matrix
 from magfem.typing import Floats, Points
 
@@ -39,6 +40,27 @@ class Interaction:
         for k in range(count):
             tangent[k, :3, k, :3] -= 0.5 * cross_matrix(wrench[k, :3])
         return energy, wrench, tangent
+
+    def check_places(self, R: Floats, p: Points) -> None:
+        """Raise OutsideRegionError for a magnet where another's field makes no promise.
+
+        Beyond the far end of a shell about its source a field is taken all the same: there it is a dipole's, ever more.
+        """
+        for i in range(len(self.fields)):
+            for j, field in enumerate(self.fields):
+                region = getattr(field, "region", None)
+                if i == j or region is None:
+                    continue
+                local = (p[i] - p[j]) @ R[j]
+                if isinstance(region, Shell):
+                    inside = float(region.hull.distance(local[None])[0]) >= region.clearance * (1 - 1e-9)
+                else:
+                    inside = bool(np.all(region.contains(local)))
+                if not inside:
+                    raise OutsideRegionError(
+                        f"magnet {i} of the rod ends where the field of magnet {j} makes no promise "
+                        f'({region.describe()}); outside="extrapolate" takes it as it is'
+                    )
 
     def _add_pair(self, i: int, j: int, R: Floats, p: Points, wrench: Floats, tangent: Floats) -> float:
         """The dipole of i in the field of j: adds the wrenches on both, and −∂w/∂x."""

@@ -11,9 +11,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from magfem.errors import MagfemError
+from magfem.errors import ConvergenceError, InputError, OutsideRegionError
+from magfem.rod.rod import Rod
 from magfem.rod.state import RodState
 from magfem.rod.steering import Controller, Steering
+from magfem.rod.stiffness_estimate import stiffened
 from magfem.typing import Floats
 
 STARTS = 24
@@ -28,19 +30,24 @@ def plan(controller: Controller, now: Steering, seed: int = 0, starts: int = STA
     """`now` with a route to where steering will arrive by the model; outcome "unreachable" when no start leads there.
 
     The first start are zero currents and joints; the others are random within half the limits, by `seed`.
+    Raises InputError for less than one start, ConvergenceError when the model has no stable shape without currents.
     """
+    if starts < 1:
+        raise InputError(f"a plan needs at least one start, got {starts!r}")
     rng = np.random.default_rng([seed, now.plans])
     low, high = controller.limits
-    rod = now.model.rod
+    rod = stiffened(controller.rod, now.stiffness.factor) if controller.adapt else now.model.rod
     rest = np.clip(np.zeros_like(low), low, high)
-    at_rest = _model(controller, now, rest, None)
+    at_rest = _model(controller, rod, rest, None)
+    if at_rest is None:
+        raise ConvergenceError("no plan can be rehearsed: the model has no stable shape without currents")
     rehearsal = replace(controller, rod=rod, adapt=False, room=_ROOM)
     # What has led into this cannot lead out of it: after a first plan the start at rest was tried already.
-    for k in range(int(now.plans > 0), starts):
+    for k in range(int(now.plans > 0), starts + int(now.plans > 0)):
         start = rest if k == 0 else np.clip(0.5 * rng.uniform(low, high), low, high)
-        model = at_rest
+        model: RodState | None = at_rest
         for part in np.linspace(0, 1, _RAMP)[1:] if k else ():
-            model = None if model is None else _model(controller, now, rest + part * (start - rest), model)
+            model = None if model is None else _model(controller, rod, rest + part * (start - rest), model)
         if model is None:
             continue
         if _arrives(rehearsal, model, start):
@@ -60,12 +67,12 @@ def _arrives(controller: Controller, model: RodState, parameters: Floats) -> boo
     return trial.outcome == "converged"
 
 
-def _model(controller: Controller, now: Steering, parameters: Floats, guess: RodState | None) -> RodState | None:
+def _model(controller: Controller, rod: Rod, parameters: Floats, guess: RodState | None) -> RodState | None:
     """The model's stable state at the parameters; None when there is none."""
     c = controller.coils
     field = (controller.system, parameters[:c], parameters[c:])
     try:
-        state = now.model.rod.solve(field, controller.gravity, guess=guess, strict=False)
-    except MagfemError:
+        state = rod.solve(field, controller.gravity, guess=guess, strict=False)
+    except (ConvergenceError, OutsideRegionError):
         return None
     return state if state.stable else None

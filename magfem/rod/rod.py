@@ -33,7 +33,8 @@ class Rod:
 
     sections: one or more, at least one of them flexible.  base: the pose of the rod's beginning in the world.
     magnet_fields: with it, the magnets act on each other: a field (T, in the magnet's frame) for every MagnetSection,
-    such as its fitted model, or None for a dipole's.
+    such as its fitted model, or None for a dipole's. Each acts on the others as on dipoles at their centres, whatever
+    their `field_points`; hard-magnetic sections take no part.
     """
 
     sections: tuple[Section, ...]
@@ -115,7 +116,8 @@ class Rod:
         guess : the state of a rod with equal sections, to start from; without one, the unloaded shape.
         strict : False returns a state that did not converge, instead of raising.
         outside : "raise" when a magnet ends outside the field's region, or "extrapolate".
-        leave_saddles : False returns an unstable equilibrium when Newton's method has found one.
+        leave_saddles : False returns an unstable equilibrium when Newton's method has found one. Under loads without a
+            potential the rod creeps to its equilibrium, which does not leave a saddle that it starts on.
         tolerance : of the residual, rad.
 
         Raises InputError for what cannot be used, ConvergenceError (residual, iterations), OutsideRegionError.
@@ -173,6 +175,9 @@ class Rod:
                 f"a magnet of the rod is pulled out of the field's region ({region.describe()}); strict=False returns "
                 'the last shape, outside="extrapolate" takes the field there as it is'
             )
+        if strict and interaction is not None and outside == "raise":
+            nodes = chain.magnet_node
+            interaction.check_places(found.factored.shape.R[nodes], found.factored.shape.p[nodes])
         snapped = guess is not None and expected < np.inf and _snapped(guess, found.factored, expected)
         state = RodState(self, loads, found, snapped)
         if strict and not found.converged:

@@ -73,8 +73,8 @@ class RodState:
     def stable(self) -> bool:
         """Whether the equilibrium is a minimum of the energy.
 
-        With loads that have no potential: whether the symmetric part of the Hessian is positive, which excludes
-        buckling, not flutter.
+        With loads that have no potential: whether the overdamped rod creeps back to it. That excludes buckling, not the
+        flutter of a rod with mass.
         """
         return self.found.outcome == "stable"
 
@@ -95,7 +95,7 @@ class RodState:
 
     @property
     def outcome(self) -> str:
-        """ "stable", "unstable", "stalled" or "iterations", as `equilibrium.Equilibrium` explains."""
+        """ "stable", "unstable", "outside", "stalled" or "iterations", as `equilibrium.Equilibrium` explains."""
         return self.found.outcome
 
     @property

@@ -14,10 +14,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from magfem.errors import InputError, MagfemError
+from magfem.errors import ConvergenceError, InputError, OutsideRegionError
 from magfem.rod.bounded_step import Step, bounded_step
 from magfem.rod.goals import Goal, GoalError, goal_error
 from magfem.rod.rod import SNAP, Rod, largest_turn
+from magfem.rod.sections import positive, three
 from magfem.rod.state import RodState
 from magfem.rod.stiffness_estimate import StiffnessEstimate, stiffened, updated
 from magfem.typing import ArrayLike, Floats, Points
@@ -106,11 +107,24 @@ class Controller:
     room: float = 1.0
 
     def __post_init__(self) -> None:
-        if not self.goals:
-            raise InputError("a controller needs at least one goal")
-        for name in ("current_step", "joint_step", "gain", "largest_error", "tolerance"):
-            if not getattr(self, name) > 0:
-                raise InputError(f"controller: {name} must be positive, got {getattr(self, name)!r}")
+        goals = (self.goals,) if isinstance(self.goals, Goal) else tuple(self.goals)
+        object.__setattr__(self, "goals", goals)
+        if not goals or not all(isinstance(one, Goal) for one in goals):
+            raise InputError("a controller needs at least one goal, each a magfem.rod.Goal")
+        magnets = len(self.rod.magnets)
+        wrong = [one.magnet for one in goals if not 0 <= one.magnet < magnets]
+        if wrong:
+            raise InputError(f"a goal is for magnet {wrong[0]}, and the rod has {magnets}, counted from 0")
+        three("controller", "gravity", self.gravity)
+        for name in ("current_step", "joint_step", "gain", "largest_error", "tolerance", "largest_condition"):
+            positive("controller", name, getattr(self, name))
+        for name in ("damping", "relaxation"):
+            if not 0 <= getattr(self, name) < np.inf:
+                raise InputError(f"controller: {name} must not be negative, got {getattr(self, name)!r}")
+        if not 0 < self.room <= 1:
+            raise InputError(f"controller: room must lie above 0 and up to 1, got {self.room!r}")
+        if self.current_limit is not None:
+            positive("controller", "current_limit", self.current_limit)
         _ = self.limits
 
     @property
@@ -130,8 +144,9 @@ class Controller:
             raise InputError("controller: state current_limit (A), for not all coils have one")
         own = np.array([one.limits for one in self.system.joints], dtype=float).reshape(-1, 2)
         joints = own if self.joint_limits is None else np.asarray(self.joint_limits, dtype=float)
-        if joints.shape != own.shape or np.any(joints[:, 0] > joints[:, 1]):
+        if joints.shape != own.shape or not np.all(joints[:, 0] <= joints[:, 1]):
             raise InputError(f"controller: joint_limits must be {own.shape[0]} pairs, the lower first, got {joints!r}")
+        joints = np.clip(joints, own[:, :1], own[:, 1:])  # never beyond what the joints themselves allow
         top = self.room * top
         return np.concatenate([-top, joints[:, 0]]), np.concatenate([top, joints[:, 1]])
 
@@ -144,9 +159,17 @@ class Controller:
     def begin(
         self, currents: ArrayLike | None = None, joints: ArrayLike | None = None, guess: RodState | None = None
     ) -> Steering:
-        """Steering that starts from currents and joints, zero by default. Raises as `Rod.solve` does."""
-        amperes = np.zeros(self.coils) if currents is None else np.array(currents, dtype=float)
-        angles = np.zeros(len(self.system.joints)) if joints is None else np.array(joints, dtype=float)
+        """Steering that starts from currents and joints, by default those nearest to zero within the limits.
+
+        Raises as `Rod.solve` does, and InputError for values beyond the limits.
+        """
+        low, high = self.limits
+        nearest = np.clip(np.zeros_like(low), low, high)
+        amperes = nearest[: self.coils] if currents is None else self.system.checked_currents(currents)
+        angles = nearest[self.coils :] if joints is None else self.system.checked_joints(joints)
+        start = np.concatenate([amperes.ravel(), angles])
+        if start.shape != low.shape or np.any((start < low - 1e-9) | (start > high + 1e-9)):
+            raise InputError("controller: steering begins within the limits of currents and joints")
         model = self.rod.solve((self.system, amperes, angles), self.gravity, guess=guess)
         return Steering(currents=amperes, joints=angles, model=model)
 
@@ -156,6 +179,7 @@ class Controller:
         Where a centreline was measured, a magnet's turn about its own axis is not known: give any, and goals of
         directions and positions alone.
         """
+        positions, frames = self._measured(positions, frames)
         before, error = now, goal_error(self.goals, positions, frames)
         now = replace(now, error=error, measured=(positions, frames), steps=now.steps + 1, expected=None)
         if now.route:
@@ -189,6 +213,19 @@ class Controller:
             expected=jacobian @ (parameters - now.parameters),
         )
 
+    def _measured(self, positions: Points, frames: Floats) -> tuple[Points, Floats]:
+        """A measurement as arrays. Raises InputError for another number of magnets, and for what is not finite."""
+        positions, frames = np.asarray(positions, dtype=float), np.asarray(frames, dtype=float)
+        count = len(self.rod.magnets)
+        if positions.shape != (count, 3) or frames.shape != (count, 3, 3):
+            raise InputError(
+                f"the rod has {count} magnets: measured positions are ({count}, 3) and frames ({count}, 3, 3), got "
+                f"{positions.shape} and {frames.shape}"
+            )
+        if not (np.isfinite(positions).all() and np.isfinite(frames).all()):
+            raise InputError("measured positions and frames must be finite numbers: leave out a step that saw nothing")
+        return positions, frames
+
     def _step(self, now: Steering, error: GoalError, J: Floats) -> Step:
         """The step, in units of `scale`, that takes away `gain` of the error."""
         near = min(1.0, error.size / 0.1)
@@ -210,7 +247,7 @@ class Controller:
         for guess in (now.model, None):
             try:
                 model = rod.solve(where, self.gravity, guess=guess, strict=False)
-            except MagfemError:
+            except (ConvergenceError, OutsideRegionError):
                 continue
             if model.stable:
                 break
@@ -234,7 +271,7 @@ class Controller:
         where = (self.system, now.currents, now.joints)
         try:
             model = stiffened(self.rod, factor).solve(where, self.gravity, guess=now.model, strict=False)
-        except MagfemError:
+        except (ConvergenceError, OutsideRegionError):
             return replace(now, stiffness=estimate)
         if not model.stable:
             return replace(now, stiffness=estimate)
@@ -257,7 +294,7 @@ class Controller:
             where = (self.system, there[: self.coils], there[self.coils :])
             try:
                 model = now.model.rod.solve(where, self.gravity, guess=now.model, strict=False)
-            except MagfemError:
+            except (ConvergenceError, OutsideRegionError):
                 continue
             if model.stable and not model.snapped:
                 return there, model

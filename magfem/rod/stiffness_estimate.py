@@ -42,20 +42,23 @@ def updated(
     that makes it fit, averaged with earlier ones by what each could tell.
     """
     nodes = model.loads.chain.magnet_node
-    moved = model.sensitivity("youngs_modulus")
-    moduli = np.array([one.youngs_modulus for one in model.rod.sections if isinstance(one, FlexibleSection)])
+    flexible = [one for one in model.rod.sections if isinstance(one, FlexibleSection)]
+    moved, moduli = model.sensitivity("youngs_modulus"), np.array([one.youngs_modulus for one in flexible])
     frames = model.magnet_frames[:, :, 2]
-    shift = moved.positions[nodes] @ moduli / POSITION_SCALE
-    a, b = moved.rotations[nodes] @ moduli, frames
+    shift, a, b = moved.positions[nodes] @ moduli / POSITION_SCALE, moved.rotations[nodes] @ moduli, frames
+    if any(one.shear_modulus is not None for one in flexible):  # the others' follow Young's modulus
+        sheared, moduli = model.sensitivity("shear_modulus"), np.array([one.shear_modulus or 0.0 for one in flexible])
+        shift += sheared.positions[nodes] @ moduli / POSITION_SCALE
+        a = a + sheared.rotations[nodes] @ moduli
     turn = a[:, [1, 2, 0]] * b[:, [2, 0, 1]] - a[:, [2, 0, 1]] * b[:, [1, 2, 0]]
     slope = np.concatenate([shift, turn]).ravel()
     misfit = np.concatenate([(positions - model.magnet_positions) / POSITION_SCALE, axes - frames]).ravel()
     information = float(slope @ slope)
-    if information < _LEAST or np.abs(misfit).max() > _NEAR:
+    if not (information >= _LEAST and np.abs(misfit).max() <= _NEAR):
         return before
     step = float(slope @ misfit) / information
     unexplained = misfit - step * slope
-    if abs(step) > _LARGEST or unexplained @ unexplained > (1 - _EXPLAINED) * (misfit @ misfit):
+    if not (abs(step) <= _LARGEST and unexplained @ unexplained <= (1 - _EXPLAINED) * (misfit @ misfit)):
         return before
     weight = _FORGET * before.weight + information
     there = log(in_use) + step

@@ -22,6 +22,7 @@ from magfem.scenario.targets import Target
 
 log = logging.getLogger("magfem")
 
+_HELD = 3.0  # of the tolerance: what noise may do to a target while it is held
 _ATTEMPTS = 5  # to see the rod
 _IN_PLANE = 1e-4  # m that a planar scenario's rod may be off the plane
 
@@ -154,7 +155,10 @@ def _pursue(loop: _Loop, controller: Controller, now: Steering, number: int, tar
         if after.outcome == "converged" and reached is None:
             reached = k
         if reached is not None and k >= reached + scenario.hold:
-            after = replace(after, outcome="converged")
+            assert after.error is not None
+            held = after.error.size <= _HELD * controller.tolerance
+            note = "" if held else "reached, but not held"
+            after = replace(after, outcome="converged" if held else "stalled")
             break
         if reached is None and k >= scenario.most_steps:
             note = f"not reached within {scenario.most_steps} steps"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from magfem.actuation import CoilSystem
-from magfem.errors import MagfemError
+from magfem.errors import ConvergenceError, OutsideRegionError
 from magfem.rod import Rod
 from magfem.rod.state import RodState
 from magfem.typing import Floats
@@ -23,6 +23,6 @@ class Plant:
         """The stable state that follows `before`; None when there is none within the system's region."""
         try:
             state = self.rod.solve((self.system, currents, joints), self.gravity, guess=before, strict=False)
-        except MagfemError:
+        except (ConvergenceError, OutsideRegionError):
             return None
         return state if state.stable else None

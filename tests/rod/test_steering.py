@@ -160,3 +160,61 @@ def test_input_that_cannot_be_steered_by(bigmag):
             goals=[goal],
         )
     assert len(set(OUTCOMES)) == 7
+    for wrong, words in (
+        ({"gravity": (0, 0, np.nan)}, "gravity"),
+        ({"current_limit": -1.0}, "current_limit must be positive"),
+        ({"room": 5.0}, "room"),
+        ({"damping": -1.0}, "damping"),
+        ({"joint_limits": [[0, np.nan], [0, 1]]}, "the lower first"),
+        ({"goals": [Goal(magnet=7, direction=(1, 0, 0))]}, "magnet 7"),
+        ({"goals": ["up"]}, "Goal"),
+    ):
+        with pytest.raises(InputError, match=words):
+            Controller(**{"rod": rod, "system": bigmag, "goals": [goal], **wrong})
+    controller = Controller(rod=rod, system=bigmag, goals=goal, current_limit=2.0)
+    with pytest.raises(InputError, match="within the limits"):
+        controller.begin(currents=np.full(6, 3.0))
+    now = controller.begin()
+    with pytest.raises(InputError, match="2 magnets"):
+        controller.advance(now, np.zeros((1, 3)), np.eye(3)[None])
+    with pytest.raises(InputError, match="finite"):
+        controller.advance(now, np.full((2, 3), np.nan), np.tile(np.eye(3), (2, 1, 1)))
+
+
+def test_joints_start_and_stay_within_limits_that_leave_out_zero(bigmag):
+    limits = [[0.1, 0.3], [-0.4, -0.2]]
+    controller = Controller(
+        rod=two_magnets(), system=bigmag, goals=[Goal(magnet=0, direction=(1, 0, 0.2))], joint_limits=limits
+    )
+    now, _, history = drive(controller, two_magnets())
+    joints = np.array([one.joints for one in history])
+    assert np.all((joints >= [0.1, -0.4]) & (joints <= [0.3, -0.2]))
+    assert now.outcome == "converged"
+
+
+def test_stiffness_is_found_with_a_stated_shear_modulus(bigmag):
+    """Both moduli 1.1 times the model's: the estimate is of both."""
+    from magfem.rod.stiffness_estimate import StiffnessEstimate, stiffened, updated
+
+    rod = two_magnets()
+    stated = type(rod)(
+        [replace(one, shear_modulus=2e6) if hasattr(one, "shear_modulus") else one for one in rod.sections], rod.base
+    )
+    where = (bigmag, [1.0, -2, 3, -1, 2, 1], [0.3, -0.2])
+    plant = stiffened(stated, 1.1).solve(where)
+    estimate, in_use, model = StiffnessEstimate(), 1.0, stated.solve(where)
+    for _ in range(4):
+        estimate = updated(estimate, model, in_use, plant.magnet_positions, plant.magnet_frames[:, :, 2])
+        in_use = estimate.factor
+        model = stiffened(stated, in_use).solve(where)
+    assert in_use == pytest.approx(1.1, rel=2e-3)
+
+
+def test_a_direction_straight_back_is_steered_to_from_a_straight_rod(bigmag):
+    """Exactly opposite there is no way round that is shorter; one is taken, and the error falls."""
+    rod = two_magnets()
+    controller = Controller(rod=rod, system=bigmag, goals=[Goal(magnet=1, direction=(-1, 0, 0))], gravity=(0, 0, 0))
+    now = controller.begin()
+    for _ in range(40):
+        now = controller.advance(now, now.model.magnet_positions, now.model.magnet_frames)
+    assert np.degrees(now.error.size) < 150
