@@ -4,8 +4,8 @@ Every step: the magnets' wrenches at the measured poses (2.11–2.16); the shape
 Jacobian by finite differences, one boundary value problem for every current and joint, the wrenches still at the
 measured poses; a PI controller on angle and axis of rotation (2.20); the truncated pseudo-inverse (2.21, 2.22). Two
 properties that `steering` does not have come with the coordinates: the arc cosine's slope is infinite where a magnet
-points along the global z, where its axis of rotation is lost; and 1 − k_d·k has no slope at the goal, so that the goal
-is neared ever more slowly.
+points along the global z, where its axis of rotation is lost; and 1 − k_d·k has no slope at the goal, so that near it
+finite differences, or a model that is not the plant, give that row of the Jacobian wrong, in size and in sign.
 """
 
 from __future__ import annotations
