@@ -129,6 +129,10 @@ EXPECTED = {
         ("now.outcome == 'limit active' and plan(impossible, now, starts=4).outcome == 'unreachable'", True, 0),
         ("[one['outcome'] == 'converged' for one in told['targets']] == [True, False] and run.passed.all()", True, 0),
     ],
+    "shape-sensing.md": [
+        ("abs(np.degrees(np.arctan2(middle[0], middle[2])) - 45) < 0.3", True, 0),  # half of a quarter circle
+        ("np.linalg.norm(seen.position(s[:120]) - rod[:120], axis=1).max() < 3e-4", True, 0),
+    ],
     "rods.md": [
         ("state.stable and np.abs(state.internal_force[-1]).max()", 0.0, 0),  # nothing acts on the tip
         ("np.degrees(np.arccos(hook.frames[-1][2, 2]))", np.degrees(0.5), 1e-9),
