@@ -140,6 +140,42 @@ def cold_starts(trials: int = 300) -> None:
     show(f"{trials} cold starts", ("cameras", "bent up to", "outliers", "found", "refused", "wrong"), rows)
 
 
+def placements(trials: int = 60) -> None:
+    """How well two cameras see a quarter of a circle that ends along +x, by where they stand.
+
+    Turns of a direction are measured in its stated deviations: their mean square over 2 is 1 where these are true.
+    """
+    s = np.linspace(0, LENGTH, 150)
+    place = circle(s, np.pi / 2)[0]
+    exact = circle(MAGNETS, np.pi / 2)[1]
+    front = (0.02, -0.3, 0.02)
+    stands = {
+        "side by side, both in front": ((-0.1, -0.3, 0.02), (0.12, -0.3, 0.02)),
+        "one in front, one aside and below": (front, (0.2, -0.2, -0.15)),
+        "one in front, one above it": (front, (0.02, -0.15, 0.28)),
+        "one in front, one on top": (front, (0.02, 0.02, 0.32)),
+    }
+    rows = []
+    for name, positions in stands.items():
+        cameras = [Camera.looking_at((0.015, 0, 0.02), position, 2500.0) for position in positions]
+        farthest, turns, stated = [], [], []
+        for seed in range(trials):
+            views = simulate_views(cameras, place, np.random.default_rng(seed), missing=0.1, outliers=0.05)
+            found = fit_centreline_to_views(
+                cameras, [view.pixels for view in views], LENGTH, (0, 0, 0), base_tangent=(0, 0, 1)
+            )
+            poses = magnet_poses(found, MAGNETS)
+            turn = poses.directions - exact
+            inverse = np.linalg.pinv(poses.direction_covariance, rcond=1e-6, hermitian=True)
+            farthest.append(np.linalg.norm(found.position(s) - place, axis=-1).max())
+            turns.append(np.einsum("mi,mij,mj->m", turn, inverse, turn) / 2)
+            stated.append(np.sqrt(np.trace(found.position_covariance(LENGTH))))
+        row = [1e6 * np.median(farthest), 1e6 * max(farthest), 1e6 * np.median(stated)]
+        rows.append([name, *(f"{value:.0f}" for value in row), f"{np.mean(turns):.2f}"])
+    header = ("cameras", "farthest off, median µm", "worst", "stated at the tip", "turns over stated")
+    show(f"Two cameras, 0.5 px, {trials} pairs of pictures", header, rows)
+
+
 def draw(folder: Path) -> None:
     """A measured rod: its cloud and both fits from the side, and what each says of the direction along it."""
     generator = np.random.default_rng(4)
@@ -180,4 +216,5 @@ if __name__ == "__main__":
     directions()
     times()
     cold_starts()
+    placements()
     draw(Path(arguments[arguments.index("--figures") + 1]) if "--figures" in arguments else FIGURES)

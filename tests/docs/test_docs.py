@@ -8,8 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from magfem.cli.program import command_line
+from magfem.rod import MagnetPoses
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), ROOT / "benchmarks" / "README.md"]
@@ -28,6 +30,22 @@ RIGID, RIGID_SLOPE = on_axis(3.0), (on_axis(3.001) - on_axis(2.999)) / 2e-6
 # B_z (T) at 1 A of 24 loops that fill radii 1 to 6 mm, 1 mm above their middle.
 RADII = 1e-3 + 5e-3 * (np.arange(24) + 0.5) / 24
 LOOPS = float((2e-7 * np.pi * RADII**2 / (RADII**2 + 1e-6) ** 1.5).sum())
+
+
+def off_the_quarter(poses: MagnetPoses) -> float:
+    """How far poses 20 and 40 mm along a quarter of a circle of 50 mm are off: the largest squared error, over its stated
+    covariance, next to what χ² exceeds once in a thousand.
+    """
+    angle, radius = np.radians([36, 72]), 0.1 / np.pi
+    shift = poses.positions - radius * np.stack([1 - np.cos(angle), 0 * angle, np.sin(angle)], axis=1)
+    turn = poses.directions - np.stack([np.sin(angle), 0 * angle, np.cos(angle)], axis=1)
+    pairs = ((shift, poses.position_covariance, 3), (turn, poses.direction_covariance, 2))
+    return max(
+        float(np.einsum("mi,mij,mj->m", away, np.linalg.pinv(spread, rcond=1e-6, hermitian=True), away).max())
+        / chi2.ppf(0.999, freedom)
+        for away, spread, freedom in pairs
+    )
+
 
 # For every Python block of a page, in order: an expression, its value, and the relative tolerance.
 EXPECTED = {
@@ -130,8 +148,19 @@ EXPECTED = {
         ("[one['outcome'] == 'converged' for one in told['targets']] == [True, False] and run.passed.all()", True, 0),
     ],
     "shape-sensing.md": [
-        ("abs(np.degrees(np.arctan2(middle[0], middle[2])) - 45) < 0.3", True, 0),  # half of a quarter circle
-        ("np.linalg.norm(seen.position(s[:120]) - rod[:120], axis=1).max() < 3e-4", True, 0),
+        ("not line.used[::10].any() and abs(line.noise / 1e-4 - 1) < 0.2 and off_the_quarter(poses) < 1", True, 0),
+        (
+            "np.degrees(np.arctan2(direction[0], direction[2])) - 36",
+            np.degrees(2e-3 / 0.05 * np.pi / 4),
+            1e-6,
+        ),  # κ δs/2
+        (
+            "abs(carried - carried[0]).max() + abs(carried[:, :, 2] - [0.6, 0, 0.8]).max()"
+            " + ('undefined where the rod is straight' not in refused)",
+            0.0,
+            1e-9,
+        ),
+        ("abs(seen.noise / 0.5 - 1) < 0.2 and off_the_quarter(of_magnets) < 1", True, 0),
     ],
     "rods.md": [
         ("state.stable and np.abs(state.internal_force[-1]).max()", 0.0, 0),  # nothing acts on the tip
@@ -167,7 +196,7 @@ def test_python_blocks_give_the_numbers_they_promise(name, tmp_path, monkeypatch
     names: dict[str, object] = {}
     for number, (text, (expression, value, tolerance)) in enumerate(zip(code, EXPECTED[name], strict=True)):
         exec(compile(text, f"{name}, Python block {number + 1}", "exec"), names)
-        found = eval(expression, names | {"LOOPS": LOOPS})
+        found = eval(expression, names | {"LOOPS": LOOPS, "off_the_quarter": off_the_quarter})
         assert found == pytest.approx(value, rel=tolerance, abs=tolerance if value == 0 else 0), (number, expression)
 
 
