@@ -33,8 +33,8 @@ LOOPS = float((2e-7 * np.pi * RADII**2 / (RADII**2 + 1e-6) ** 1.5).sum())
 
 
 def off_the_quarter(poses: MagnetPoses) -> float:
-    """How far poses 20 and 40 mm along a quarter of a circle of 50 mm are off: the largest squared error, over its stated
-    covariance, next to what χ² exceeds once in a thousand.
+    """How far poses 20 and 40 mm along a quarter of a circle of 50 mm are off: the largest of their squared errors over
+    the stated covariance, next to what χ² exceeds once in a thousand.
     """
     angle, radius = np.radians([36, 72]), 0.1 / np.pi
     shift = poses.positions - radius * np.stack([1 - np.cos(angle), 0 * angle, np.sin(angle)], axis=1)
