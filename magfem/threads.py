@@ -6,10 +6,11 @@ import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
-from threadpoolctl import threadpool_limits
+from threadpoolctl import ThreadpoolController
 
 
 def in_chunks(run: Callable[[slice], None], count: int, at_least: int, block: int = 1) -> None:
@@ -36,8 +37,19 @@ def one_thread_for_algebra() -> Iterator[None]:
     A fit decomposes many small matrices, on which threads spend more time waiting for each other than working: with
     two of them on a busy machine of two cores more than ten times as long as one.
     """
-    with threadpool_limits(limits=1, user_api="blas"):
+    with _libraries().limit(limits=1, user_api="blas"):
         yield
+
+
+@cache
+def _libraries() -> ThreadpoolController:
+    """The libraries loaded when they are first asked for: to look for them takes 2 ms, as long as a whole fit.
+
+    SciPy brings its own copy of BLAS, which counts only when it has been loaded before.
+    """
+    import scipy.linalg  # noqa: F401
+
+    return ThreadpoolController()
 
 
 def _processors() -> int:

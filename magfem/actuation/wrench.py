@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from magfem.cross_matrix import cross_matrix
 from magfem.typing import Floats, Hessians, Tensors, Vectors
 
 _FIVE = [0, 1, 2, 4, 5]  # of the gradient's nine, row by row
@@ -55,11 +56,3 @@ def wrench_by_point(moment: Vectors, gradient: Tensors, hessian: Hessians) -> Fl
 def wrench_by_rotation(moment: Vectors, B: Vectors, gradient: Tensors) -> Floats:
     """Derivative (..., 6, 3) of the wrench with respect to a rotation vector θ of the dipole, δm = θ × m."""
     return -wrench_by_moment(B, gradient) @ cross_matrix(moment)
-
-
-def cross_matrix(vectors: Vectors) -> Floats:
-    """The matrices (..., 3, 3) that take a vector to its cross product with `vectors` (..., 3) on the left."""
-    x, y, z = np.moveaxis(np.asarray(vectors, dtype=float), -1, 0)
-    zero = np.zeros_like(x)
-    rows = [[zero, -z, y], [z, zero, -x], [-y, x, zero]]
-    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))

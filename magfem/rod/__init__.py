@@ -10,7 +10,6 @@ from magfem.rod.magnet_pose import MagnetPoses, magnet_poses
 from magfem.rod.planning import plan
 from magfem.rod.rod import Rod
 from magfem.rod.sections import CrossSection, FlexibleSection, MagnetSection
-from magfem.rod.shape_sensor import ShapeSensor
 from magfem.rod.state import RodState
 from magfem.rod.steering import Controller, Steering
 
@@ -25,7 +24,6 @@ __all__ = [
     "MagnetSection",
     "Rod",
     "RodState",
-    "ShapeSensor",
     "Steering",
     "Triangulation",
     "View",

@@ -97,11 +97,16 @@ def applied_field(field: Field | Driven | None) -> AppliedField | None:
         if amperes.ndim != 1:
             raise InputError(f"a rod takes one set of currents, shape ({len(system.coils)},), got {amperes.shape}")
         return DrivenField(system, amperes, system.checked_joints(joints))
+    check_field(field, "a rod's field is a Field in T, or (system, currents, joints)")
+    return StaticField(field)
+
+
+def check_field(field: object, expected: str) -> None:
+    """Raise InputError, with what was `expected`, unless `field` has a jet and is in T, or does not say its unit."""
     if not callable(getattr(field, "jet", None)):
         raise InputError(
-            f"a rod's field is a Field or (system, currents, joints), got {type(field).__name__}: "
-            "magfem.load_model, system.at(currents) and magfem.fields.UniformField give fields"
+            f"{expected}, got {type(field).__name__}: magfem.load_model, system.at(currents) and "
+            "magfem.fields.UniformField give fields"
         )
     if getattr(field, "unit", "T") != "T":
-        raise InputError("a rod's field is in T: multiply a field per ampere by its current in A")
-    return StaticField(field)
+        raise InputError(f"{expected}, got one per ampere: multiply it by its current in A")

@@ -100,6 +100,13 @@ class Factored:
         """
         return self._corrected(*self._chain_answer(twist_load, node_load, base))
 
+    def stiffening(self) -> Floats:
+        """(e + 1, 6) variations of the nodes per unit of the logarithm of a factor of all moduli.
+
+        The elastic forces grow in proportion to it, and the rod answers to that as to loads.
+        """
+        return self.step(twist_load=-elastic_forces(self.chain, self.shape.twist - self.chain.rest))[1]
+
     def _corrected(self, twist: Floats, x: Floats) -> tuple[Floats, Floats]:
         """What H answers, from what H₀ does."""
         if self.acting.remainder is None:
@@ -193,7 +200,7 @@ class Factored:
             units[link, :, 12 * k : 12 * k + 12] = np.eye(12)
         answers, _ = self.answer(twist_load=elastic_forces(self.chain, units))
         modes = np.linalg.eigvals(answers[links].reshape(12 * links.size, -1))
-        return int(np.count_nonzero(modes.real < 0))
+        return int(np.count_nonzero(modes.real < -NEUTRAL * np.abs(modes) ** 2))  # Re 1/mode < −NEUTRAL
 
 
 def elastic_forces(chain: Chain, twist: Floats) -> Floats:

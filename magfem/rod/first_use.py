@@ -40,7 +40,7 @@ def compile_beside(applied: AppliedField | None) -> None:
     if mark is None or mark.exists() or not sys.executable:
         return
     log.info("first use on this machine: compiling the kernels of rods, once, about 20 s")
-    command = [sys.executable, "-c", _STATEMENT]
+    command = [sys.executable, "-P", "-c", _STATEMENT]  # -P: modules of the folder we are in stay out of it
     try:
         process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     except OSError:

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from magfem.cross_matrix import cross_matrix
 from magfem.errors import InputError
-from magfem.rod.cross_matrix import cross_matrix
 from magfem.rod.sections import three
 from magfem.typing import ArrayLike, Floats, Points
 

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from magfem.errors import InputError, OutsideRegionError
+from magfem.cross_matrix import cross_matrix
 from magfem.fields.field import Field
 from magfem.fields.region import Shell
-from magfem.rod.cross_matrix import cross_matrix
+from magfem.rod.applied_field import check_field
 from magfem.typing import Floats, Points
 
 
@@ -41,8 +41,8 @@ class Interaction:
             tangent[k, :3, k, :3] -= 0.5 * cross_matrix(wrench[k, :3])
         return energy, wrench, tangent
 
-    def check_places(self, R: Floats, p: Points) -> None:
-        """Raise OutsideRegionError for a magnet where another's field makes no promise.
+    def misplaced(self, R: Floats, p: Points) -> str:
+        """Words for a magnet where another's field makes no promise, empty when there is none.
 
         Beyond the far end of a shell about its source a field is taken all the same: there it is a dipole's, ever more.
         """
@@ -57,10 +57,8 @@ class Interaction:
                 else:
                     inside = bool(np.all(region.contains(local)))
                 if not inside:
-                    raise OutsideRegionError(
-                        f"magnet {i} of the rod ends where the field of magnet {j} makes no promise "
-                        f'({region.describe()}); outside="extrapolate" takes it as it is'
-                    )
+                    return f"ends where the field of magnet {j} makes no promise ({region.describe()})"
+        return ""
 
     def _add_pair(self, i: int, j: int, R: Floats, p: Points, wrench: Floats, tangent: Floats) -> float:
         """The dipole of i in the field of j: adds the wrenches on both, and −∂w/∂x."""
@@ -97,17 +95,14 @@ class Interaction:
 def check_fields(fields: Sequence[Field | None]) -> None:
     """Raise InputError unless all are fields in T, or None."""
     for k, one in enumerate(fields):
-        if one is not None and (not isinstance(one, Field) or one.unit != "T"):
-            got = f"a field in {one.unit}" if isinstance(one, Field) else type(one).__name__
-            raise InputError(f"magnet_fields takes a Field in T or None for every magnet, got {got} as entry {k}")
+        if one is not None:
+            check_field(one, f"entry {k} of magnet_fields is a Field in T, or None")
 
 
 def interaction_of(fields: Sequence[Field | None], moments: Floats) -> Interaction:
-    """Of magnets with `fields`; the field of a dipole stands in for None. Raises InputError for a wrong number."""
+    """Of magnets with `fields`; the field of a dipole stands in for None."""
     from magfem.fields.dipole_field import DipoleField
 
-    if len(fields) != len(moments):
-        raise InputError(f"the rod has {len(moments)} magnets, and fields of {len(fields)} are given")
     return Interaction(
         tuple(DipoleField(moment) if one is None else one for one, moment in zip(fields, moments, strict=True)), moments
     )

@@ -7,9 +7,9 @@ from functools import cached_property
 
 import numpy as np
 
+from magfem.cross_matrix import cross_matrix
 from magfem.rod.applied_field import AppliedField
 from magfem.rod.chain import Chain
-from magfem.rod.cross_matrix import cross_matrix
 from magfem.rod.interaction import Interaction
 from magfem.rod.load_kernel import field_points, node_loads
 from magfem.typing import Floats, Integers, Jet, Points

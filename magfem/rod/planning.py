@@ -41,7 +41,7 @@ def plan(controller: Controller, now: Steering, seed: int = 0, starts: int = STA
     at_rest = _model(controller, rod, rest, None)
     if at_rest is None:
         raise ConvergenceError("no plan can be rehearsed: the model has no stable shape without currents")
-    rehearsal = replace(controller, rod=rod, adapt=False, room=_ROOM)
+    rehearsal = replace(controller, rod=rod, adapt=False, room=_ROOM * controller.room)
     # What has led into this cannot lead out of it: after a first plan the start at rest was tried already.
     for k in range(int(now.plans > 0), starts + int(now.plans > 0)):
         start = rest if k == 0 else np.clip(0.5 * rng.uniform(low, high), low, high)

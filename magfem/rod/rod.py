@@ -168,16 +168,21 @@ class Rod:
             found = find_equilibrium(chain, loads, R, p, start, tolerance, most_iterations, leave_saddles, allowed)
         else:
             found = relax(chain, loads, R, p, start, tolerance, most_iterations)
-        if region is not None and not np.all(region.contains(found.factored.acting.points)):
-            found = replace(found, outcome="outside")
-        if strict and found.outcome == "outside" and region is not None:
-            raise OutsideRegionError(
-                f"a magnet of the rod is pulled out of the field's region ({region.describe()}); strict=False returns "
-                'the last shape, outside="extrapolate" takes the field there as it is'
-            )
-        if strict and interaction is not None and outside == "raise":
+        why = ""
+        if interaction is not None and outside == "raise":
             nodes = chain.magnet_node
-            interaction.check_places(found.factored.shape.R[nodes], found.factored.shape.p[nodes])
+            why = interaction.misplaced(found.factored.shape.R[nodes], found.factored.shape.p[nodes])
+        if region is not None and (
+            found.outcome == "outside" or not np.all(region.contains(found.factored.acting.points))
+        ):
+            why = f"is pulled out of the field's region ({region.describe()})"
+        if why:
+            found = replace(found, outcome="outside")
+            if strict:
+                raise OutsideRegionError(
+                    f"a magnet of the rod {why}; strict=False returns the last shape, "
+                    'outside="extrapolate" takes the field there as it is'
+                )
         snapped = guess is not None and expected < np.inf and _snapped(guess, found.factored, expected)
         state = RodState(self, loads, found, snapped)
         if strict and not found.converged:

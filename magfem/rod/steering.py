@@ -17,7 +17,7 @@ import numpy as np
 from magfem.errors import ConvergenceError, InputError, OutsideRegionError
 from magfem.rod.bounded_step import Step, bounded_step
 from magfem.rod.goals import Goal, GoalError, goal_error
-from magfem.rod.rod import SNAP, Rod, largest_turn
+from magfem.rod.rod import SNAP, Rod
 from magfem.rod.sections import positive, three
 from magfem.rod.state import RodState
 from magfem.rod.stiffness_estimate import StiffnessEstimate, stiffened, updated
@@ -314,6 +314,7 @@ def _jumped(before: Steering, positions: Points, frames: Floats) -> bool:
     """Whether the plant moved far more in one step than the model expected: it has snapped to another branch."""
     if before.expected is None or before.measured is None:
         return False
-    turned = [largest_turn(a[None], b[None]) for a, b in zip(before.measured[1], frames, strict=True)]
+    traces = np.einsum("mij,mij->m", before.measured[1], frames)
+    turned = np.arccos(np.clip((traces - 1) / 2, -1.0, 1.0))
     thought = np.linalg.norm(before.expected[:, 3:], axis=1)
-    return bool(np.any(np.array(turned) > np.maximum(SNAP, 8 * thought)))
+    return bool(np.any(turned > np.maximum(SNAP, 8 * thought)))

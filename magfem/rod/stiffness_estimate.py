@@ -41,15 +41,9 @@ def updated(
     model: the state of the rod whose moduli are `in_use` times the nominal ones. One Gauss–Newton step of the factor
     that makes it fit, averaged with earlier ones by what each could tell.
     """
-    nodes = model.loads.chain.magnet_node
-    flexible = [one for one in model.rod.sections if isinstance(one, FlexibleSection)]
-    moved, moduli = model.sensitivity("youngs_modulus"), np.array([one.youngs_modulus for one in flexible])
+    x = model.factored.stiffening()[model.loads.chain.magnet_node]
     frames = model.magnet_frames[:, :, 2]
-    shift, a, b = moved.positions[nodes] @ moduli / POSITION_SCALE, moved.rotations[nodes] @ moduli, frames
-    if any(one.shear_modulus is not None for one in flexible):  # the others' follow Young's modulus
-        sheared, moduli = model.sensitivity("shear_modulus"), np.array([one.shear_modulus or 0.0 for one in flexible])
-        shift += sheared.positions[nodes] @ moduli / POSITION_SCALE
-        a = a + sheared.rotations[nodes] @ moduli
+    shift, a, b = x[:, 3:] / POSITION_SCALE, x[:, :3], frames
     turn = a[:, [1, 2, 0]] * b[:, [2, 0, 1]] - a[:, [2, 0, 1]] * b[:, [1, 2, 0]]
     slope = np.concatenate([shift, turn]).ravel()
     misfit = np.concatenate([(positions - model.magnet_positions) / POSITION_SCALE, axes - frames]).ravel()

@@ -73,10 +73,8 @@ WRONG = {
     "a rod's base is one pose": lambda: Rod([SECTION], base=[0, 0, 0]),
     "a rod's base is one pose, ": lambda: Rod([SECTION], base=RigidTransform.from_translation(np.zeros((2, 3)))),
     "the rod has 1 magnets, and magnet_fields has 2 entries": lambda: Rod([SECTION, MAGNET], None, [None, None]),
-    "magnet_fields takes a Field in T or None for every magnet, got str as entry 0": lambda: Rod(
-        [SECTION, MAGNET], None, ["dipole"]
-    ),
-    "got a field in T/A as entry 0": lambda: Rod([SECTION, MAGNET], None, [magfem.load_model("bigmag_air")]),
+    "entry 0 of magnet_fields is a Field in T, or None, got str": lambda: Rod([SECTION, MAGNET], None, ["dipole"]),
+    "entry 0 of magnet_fields is a Field in T, or None, got one per ampere": lambda: Rod([SECTION, MAGNET], None, [magfem.load_model("bigmag_air")]),
     'outside must be "raise" or "extrapolate", got \'nan\'': solved(outside="nan"),
     "gravity must be three finite numbers, got 9.81": solved(gravity=9.81),
     "tip_force must be three finite numbers": solved(tip_force=(0, NAN, 0)),
@@ -84,8 +82,8 @@ WRONG = {
     "tolerance must be positive and finite, got 0": solved(tolerance=0),
     "most_iterations must be a whole number from 1, got 0": solved(most_iterations=0),
     "guess is a RodState that solve returned, got int": solved(guess=3),
-    "a rod's field is a Field or (system, currents, joints), got float": solved(field=0.1),
-    "a rod's field is in T: multiply": solved(field=magfem.load_model("bigmag_air")),
+    "a rod's field is a Field in T, or (system, currents, joints), got float": solved(field=0.1),
+    "got one per ampere: multiply": solved(field=magfem.load_model("bigmag_air")),
     "a rod's field is a Field, or (system, currents, joints) of a coil system": solved(field=(1.0, [2.0])),
 }
 
