@@ -74,7 +74,9 @@ WRONG = {
     "a rod's base is one pose, ": lambda: Rod([SECTION], base=RigidTransform.from_translation(np.zeros((2, 3)))),
     "the rod has 1 magnets, and magnet_fields has 2 entries": lambda: Rod([SECTION, MAGNET], None, [None, None]),
     "entry 0 of magnet_fields is a Field in T, or None, got str": lambda: Rod([SECTION, MAGNET], None, ["dipole"]),
-    "entry 0 of magnet_fields is a Field in T, or None, got one per ampere": lambda: Rod([SECTION, MAGNET], None, [magfem.load_model("bigmag_air")]),
+    "of magnet_fields is a Field in T, or None, got one per ampere": lambda: Rod(
+        [SECTION, MAGNET], None, [magfem.load_model("bigmag_air")]
+    ),
     'outside must be "raise" or "extrapolate", got \'nan\'': solved(outside="nan"),
     "gravity must be three finite numbers, got 9.81": solved(gravity=9.81),
     "tip_force must be three finite numbers": solved(tip_force=(0, NAN, 0)),
