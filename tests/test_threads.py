@@ -7,8 +7,9 @@ import threading
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_info
 
-from magfem.threads import in_chunks
+from magfem.threads import in_chunks, one_thread_for_algebra
 
 
 @pytest.mark.parametrize("allowed", [{0}, {0, 1, 2}])
@@ -24,3 +25,18 @@ def test_no_more_threads_than_allowed_processors(allowed, monkeypatch):
 
     in_chunks(run, 1000, at_least=1)
     assert np.all(seen == 1) and len(threads) <= len(allowed)
+
+
+def test_algebra_takes_one_thread_within_and_as_many_as_before_after():
+    """Of every BLAS that is loaded, NumPy's and SciPy's own; a second time too."""
+    import scipy.linalg  # noqa: F401
+
+    def threads() -> list[int]:
+        return [one["num_threads"] for one in threadpool_info() if one["user_api"] == "blas"]
+
+    before = threads()
+    assert before
+    for _ in range(2):
+        with one_thread_for_algebra():
+            assert set(threads()) == {1} and len(threads()) == len(before)
+        assert threads() == before
