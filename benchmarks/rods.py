@@ -2,8 +2,8 @@
 
 `python benchmarks/rods.py figure` draws docs/figures/rods.png instead.
 
-The process keeps to one core and counts its processor time; what is compared takes turns. The first table is the
-dissertation's manipulator in BigMag at random currents: this package cold, warm after steps of at most 0.4 A, and with
+The process keeps to one core and counts its processor time; what is compared takes turns. The first table is a manipulator like the
+dissertation's (whose dimensions its text lacks) in BigMag at random currents: this package cold, warm after steps of at most 0.4 A, and with
 its Jacobian; the same Cosserat equations by scipy's `solve_bvp`, and by single shooting as in the dissertation
 (explicit Runge–Kutta steps of order four, Levenberg–Marquardt with differences), whose steps are compiled by Numba.
 Their Jacobians take one more solution for every current. The second is a cantilever under a dead tip force, next to
@@ -43,7 +43,7 @@ FORCE, TORQUE = E * SECOND / 0.07**2, E * SECOND / 0.07  # units of the internal
 
 
 def manipulator(elements: int | None = None) -> Rod:
-    """Two silicone sections, each with a magnet at its end."""
+    """Two polyurethane sections, each with a magnet at its end."""
     parts: list[FlexibleSection | MagnetSection] = []
     for length in LENGTHS:
         parts.append(
