@@ -2,10 +2,11 @@
 
 `python benchmarks/rods.py figure` draws docs/figures/rods.png instead.
 
-The process keeps to one core and counts its processor time; what is compared takes turns. The first table is a manipulator like the
-dissertation's (whose dimensions its text lacks) in BigMag at random currents: this package cold, warm after steps of at most 0.4 A, and with
-its Jacobian; the same Cosserat equations by scipy's `solve_bvp`, and by single shooting as in the dissertation
-(explicit Runge–Kutta steps of order four, Levenberg–Marquardt with differences), whose steps are compiled by Numba.
+The process keeps to one core and counts its processor time; what is compared takes turns. The first table is a
+manipulator like the dissertation's, whose dimensions its text lacks, in BigMag at random currents: this package cold,
+warm after steps of at most 0.4 A, and with its Jacobian; the same Cosserat equations by scipy's `solve_bvp`, and by
+single shooting as in the dissertation (explicit Runge–Kutta steps of order four, Levenberg–Marquardt with differences),
+whose steps are compiled by Numba.
 Their Jacobians take one more solution for every current. The second is a cantilever under a dead tip force, next to
 PyElastica's dynamic relaxation, when an interpreter that has it is given.
 """
