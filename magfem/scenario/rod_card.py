@@ -126,4 +126,4 @@ def _magnet(entry: Table, kind: str) -> MagnetSection:
     if not backwards:
         return found
     x, y, z = found.moment_vector.tolist()  # turned by 180 deg about its y axis
-    return replace(found, moment=(-x, y, -z))
+    return replace(found, moment=(0.0 - x, y, 0.0 - z))  # no −0.0 for people to read
