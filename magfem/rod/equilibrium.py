@@ -244,14 +244,17 @@ def relax(
         before = system.residual
 
 
-def predicted(before: Factored, loads: Loads) -> tuple[Floats, float]:
+def predicted(before: Factored, loads: Loads) -> Floats:
     """Twists (e, 12) near the equilibrium under other loads, by how an equilibrium answers to small ones.
 
-    And by how much, rad, any cross-section should turn. Where that is much, prediction is of no use: the twists are
-    those of before.
+    Where that is much, prediction is of no use: the twists are those of before.
     """
-    shape = before.shape
-    change = loads.act(shape.R, shape.p).wrench - before.acting.wrench
+    step, turns = answer_to(before, loads)
+    return before.shape.twist + step if np.abs(turns).max() < _LARGEST_PREDICTED else before.shape.twist
+
+
+def answer_to(before: Factored, loads: Loads) -> tuple[Floats, Floats]:
+    """How twists (e, 12) change and nodes turn (e + 1, 3) rad when the loads become `loads`, to first order."""
+    change = loads.act(before.shape.R, before.shape.p).wrench - before.acting.wrench
     step, moved = before.step(node_load=change)
-    turn = float(np.abs(moved[:, :3]).max())
-    return (shape.twist + step if turn < _LARGEST_PREDICTED else shape.twist), turn
+    return step, moved[:, :3]

@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial.transform import RigidTransform
+from scipy.spatial.transform import RigidTransform, Rotation
 
 from magfem.errors import ConvergenceError, InputError, OutsideRegionError
 from magfem.rod.sections import FlexibleSection, MagnetSection, positive, three
@@ -19,12 +19,15 @@ if TYPE_CHECKING:
     from magfem.rod.applied_field import Driven
     from magfem.rod.chain import Chain
     from magfem.rod.factored import Factored
+    from magfem.rod.loads import Loads
     from magfem.rod.state import RodState
 
 Section = FlexibleSection | MagnetSection
 
 SNAP = 0.25
 """rad: smaller turns from a guess are no snap."""
+
+_UNLIKE = 0.5  # of the turn: an answer that is further off is not that of the same branch
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -152,11 +155,10 @@ class Rod:
             interaction,
         )
         R, p = self._base
-        expected = np.inf
         if guess is None:
             start = chain.rest
         elif guess.rod is self and guess.stable:
-            start, expected = predicted(guess.factored, loads)
+            start = predicted(guess.factored, loads)
         else:
             start = _start(guess, chain)
         region = None if loads.applied is None or outside == "extrapolate" else loads.applied.region
@@ -183,7 +185,7 @@ class Rod:
                     f"a magnet of the rod {why}; strict=False returns the last shape, "
                     'outside="extrapolate" takes the field there as it is'
                 )
-        snapped = guess is not None and expected < np.inf and _snapped(guess, found.factored, expected)
+        snapped = guess is not None and guess.rod is self and guess.stable and _snapped(guess, found.factored, loads)
         state = RodState(self, loads, found, snapped)
         if strict and not found.converged:
             raise ConvergenceError(
@@ -197,9 +199,20 @@ class Rod:
         return np.ascontiguousarray(self.base.rotation.as_matrix()), np.array(self.base.translation)
 
 
-def _snapped(guess: RodState, found: Factored, expected: float) -> bool:
-    """Whether the rod turned far more than the guess's own answer to the change of loads."""
-    return largest_turn(guess.frames, found.shape.R) > max(SNAP, 2 * expected)
+def _snapped(guess: RodState, found: Factored, loads: Loads) -> bool:
+    """Whether the rod has turned by much, and not as it would along one branch of shapes.
+
+    Along one, what the old shape answers to the change of loads and what the new one answers to the change back are
+    about opposite, and their mean is the turn, to third order.
+    """
+    if largest_turn(guess.frames, found.shape.R) <= SNAP:
+        return False
+    from magfem.rod.equilibrium import answer_to
+
+    turned = Rotation.from_matrix(found.shape.R @ guess.frames.transpose(0, 2, 1)).as_rotvec()
+    there, back = answer_to(guess.factored, loads)[1], answer_to(found, guess.loads)[1]
+    off = np.linalg.norm(turned - 0.5 * (there - back), axis=1).max()
+    return bool(off > _UNLIKE * np.linalg.norm(turned, axis=1).max())
 
 
 def largest_turn(before: Floats, after: Floats) -> float:

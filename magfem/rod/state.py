@@ -25,8 +25,8 @@ class RodState:
     """What `Rod.solve` found, at n cross-sections from the base to the tip.
 
     All vectors are in world axes. `rod`, `loads` and `factored` are what it was computed from and with. snapped:
-    whether the rod has left the branch of the guess, which lost its stability on the way: it turned far more than that
-    shape's own answer to the change.
+    whether the rod has left the branch of the guess, which lost its stability on the way: it turned by more than
+    `rod.SNAP`, and not as both shapes answer to the change.
     """
 
     rod: Rod
