@@ -47,7 +47,8 @@ class Pose(Branch):
     sensor saw.  ambiguous: (...) whether another branch is about as likely, as always with one sensor.  singular:
     (...) whether the branches ±β meet within what noise makes of β (β near 0 or 90° with one sensor): the covariance
     is not to be trusted there.  inside: (...) whether all sensors are where the rotor's model holds.  converged,
-    iterations: (...).  residual: (...) root of the mean square of the standardised residuals; about √(1 − 1/s) with s sensors.
+    iterations: (...).  residual: (...) root of the mean square of the standardised residuals; about √(1 − 1/s) with s
+    sensors.
     """
 
     branches: tuple[Branch, ...]
