@@ -174,7 +174,7 @@ def _demodulated(
 def _located(
     fields: tuple[RotatingField, ...], rotor: Rotor, array: SensorArray, near: ArrayLike | Pose | None, strict: bool
 ) -> Pose:
-    measured = _measured(fields, array)
+    measured = whitened(fields, array)
     position, frame, clamped = _starts(measured, rotor, array)
     repeated = Measured(measured.quadratures[..., None, :, :], measured.whitening[..., None, :, :, :])
     refined = refine(rotor, array, repeated, position, frame)
@@ -188,7 +188,7 @@ def _located(
     return pose
 
 
-def _measured(fields: Sequence[RotatingField], array: SensorArray) -> Measured:
+def whitened(fields: Sequence[RotatingField], array: SensorArray) -> Measured:
     """Quadratures and whitening of all sensors, their gains undone."""
     undo = np.linalg.inv(array.gains)
     both = np.zeros((len(undo), 6, 6))

@@ -75,7 +75,7 @@ def refine(rotor: Rotor, array: SensorArray, measured: Measured, position: Point
     scale = np.linalg.norm(p[:, None, :] - array.positions, axis=-1).min(axis=-1)
     least = CLOSEST * scale
 
-    J, residual = _linearised(rotor, array, p, R, target, weight)
+    J, residual = linearised(rotor, array, p, R, target, weight)
     misfit = np.einsum("ni,ni->n", residual, residual)
     damping, growth = np.full(count, FIRST_DAMPING), np.full(count, 2.0)
     converged, iterations = np.zeros(count, dtype=bool), np.zeros(count, dtype=np.int64)
@@ -94,7 +94,7 @@ def refine(rotor: Rotor, array: SensorArray, measured: Measured, position: Point
         step *= np.minimum(1.0, LONGEST_STEP / np.maximum(length, 1e-300))[:, None]
         tried_p = p[active] + scale[active, None] * np.einsum("nij,nj->ni", R[active], step[:, :3])
         tried_R = R[active] @ rotation_matrix(step[:, 3:])
-        tried_J, tried_residual = _linearised(rotor, array, tried_p, tried_R, target[active], weight[active])
+        tried_J, tried_residual = linearised(rotor, array, tried_p, tried_R, target[active], weight[active])
         tried = np.einsum("ni,ni->n", tried_residual, tried_residual)
         near = np.linalg.norm(tried_p[:, None, :] - array.positions, axis=-1).min(axis=-1)
         better = (tried <= misfit[active]) & (near > least[active])
@@ -123,7 +123,7 @@ def refine(rotor: Rotor, array: SensorArray, measured: Measured, position: Point
         active, J, residual = active[keep], J[keep], residual[keep]
     U, _, V = np.linalg.svd(R)
     R = U @ V  # many small turns leave a matrix that is a rotation to a few roundings
-    J, _ = _linearised(rotor, array, p, R, target, weight)
+    J, _ = linearised(rotor, array, p, R, target, weight)
     J[..., :3] = np.einsum("nkj,nij->nki", J[..., :3], R)  # from the rotor's frame to the common one
     return Refined(
         position=p.reshape(*lead, 3),
@@ -153,7 +153,7 @@ def information(rotor: Rotor, array: SensorArray, position: Points, frame: Float
     return found
 
 
-def _linearised(
+def linearised(
     rotor: Rotor, array: SensorArray, p: Points, R: Floats, target: Floats, weight: Floats
 ) -> tuple[Floats, Floats]:
     """Whitened J (n, 6s, 6) and residuals (n, 6s) of poses (n, 3), (n, 3, 3)."""
