@@ -31,7 +31,9 @@ def principal_axes(points: ArrayLike) -> tuple[Vectors, Vectors]:
         normal = np.swapaxes(columns, -1, -2) @ columns
         fixed = (count >= 5) & (size > 0)
         normal = np.where(fixed[..., None, None], normal, np.eye(5))
-        a, b, c, d, e = np.moveaxis((np.linalg.pinv(normal, hermitian=True) @ columns.sum(axis=-2)[..., None])[..., 0], -1, 0)
+        a, b, c, d, e = np.moveaxis(
+            (np.linalg.pinv(normal, hermitian=True) @ columns.sum(axis=-2)[..., None])[..., 0], -1, 0
+        )
         form = np.stack([np.stack([a, b / 2], axis=-1), np.stack([b / 2, c], axis=-1)], axis=-2)
         linear = np.stack([d, e], axis=-1)
         values, directions = np.linalg.eigh(form)

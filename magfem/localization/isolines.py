@@ -1,9 +1,9 @@
 """Isoline functions of a rotor: from its field model to what the published localization looks up (eqs. 6.4 to 6.6).
 
-The rotor's frame has the axis of rotation along +z and the moment along +x; both span the magnetization plane. There the
-places of one field strength b_iso lie on a closed curve much like an ellipse, whose semi-axes c_x and c_z follow power
-laws of b_iso. Any sensor lies in the magnetization plane twice a turn: then the field is greatest, and a quarter of a
-turn later it is least and perpendicular to the plane. The three functions tell, along the isoline,
+The rotor's frame has the axis of rotation along +z and the moment along +x; both span the magnetization plane. There
+the places of one field strength b_iso lie on a closed curve much like an ellipse, whose semi-axes c_x and c_z follow
+power laws of b_iso. Any sensor lies in the magnetization plane twice a turn: then the field is greatest, and a quarter
+of a turn later it is least and perpendicular to the plane. The three functions tell, along the isoline,
 
     p_e(b_iso, β)   where it is                                              (6.4)
     b_ratio(β)      the greatest field over the least                        (6.5)
@@ -60,7 +60,8 @@ class PowerLaw:
     offset: float
 
     def __call__(self, strengths: ArrayLike) -> Floats:
-        return self.factor * np.asarray(strengths, dtype=float) ** self.exponent + self.offset
+        lengths: Floats = self.factor * np.asarray(strengths, dtype=float) ** self.exponent + self.offset
+        return lengths
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +80,8 @@ class FourierSeries:
     def slope(self, beta: ArrayLike) -> Floats:
         """d/dβ per rad."""
         turned, order = self._turned(beta), self.frequency * np.arange(1, self.cosine.size + 1)
-        return np.cos(turned) @ (order * self.sine) - np.sin(turned) @ (order * self.cosine)
+        slopes: Floats = np.cos(turned) @ (order * self.sine) - np.sin(turned) @ (order * self.cosine)
+        return slopes
 
     def _turned(self, beta: ArrayLike) -> Floats:
         return np.multiply.outer(np.asarray(beta, dtype=float), self.frequency * np.arange(1, self.cosine.size + 1))
@@ -95,14 +97,17 @@ class CosineSum:
     phase: Floats
 
     def __call__(self, beta: ArrayLike) -> Floats:
-        return self.mean + np.cos(self._turned(beta)) @ self.amplitude
+        values: Floats = self.mean + np.cos(self._turned(beta)) @ self.amplitude
+        return values
 
     def slope(self, beta: ArrayLike) -> Floats:
         """d/dβ per rad."""
-        return -np.sin(self._turned(beta)) @ (2 * np.pi * self.frequency * self.amplitude)
+        slopes: Floats = -np.sin(self._turned(beta)) @ (2 * np.pi * self.frequency * self.amplitude)
+        return slopes
 
     def _turned(self, beta: ArrayLike) -> Floats:
-        return np.multiply.outer(np.asarray(beta, dtype=float), 2 * np.pi * self.frequency) - self.phase
+        turned: Floats = np.multiply.outer(np.asarray(beta, dtype=float), 2 * np.pi * self.frequency) - self.phase
+        return turned
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +130,8 @@ class IsolineFunctions:
 
     def distance(self, strength: ArrayLike, beta: ArrayLike) -> Floats:
         """|p_e| (...) m."""
-        return np.linalg.norm(self.position(strength, beta), axis=-1)
+        lengths: Floats = np.linalg.norm(self.position(strength, beta), axis=-1)
+        return lengths
 
     def ratio(self, beta: ArrayLike) -> Floats:
         """b_ratio (6.5)."""
@@ -138,7 +144,8 @@ class IsolineFunctions:
     def polar_angle(self, strength: ArrayLike, beta: ArrayLike) -> Floats:
         """The polar angle rad of p_e: β itself where the parametrisation is polar."""
         x, z = np.moveaxis(self.position(strength, beta), -1, 0)
-        return np.arctan2(z, x)
+        angles: Floats = np.arctan2(z, x)
+        return angles
 
     def beta_of_ratio(self, ratio: ArrayLike) -> Floats:
         """β rad in [0, π/2] whose ratio is nearest, to a thousandth of a degree (6.8)."""
@@ -213,11 +220,11 @@ def isoline_radii(field: Field, strengths: ArrayLike, polar: ArrayLike) -> Float
     """
     strength, angle = np.broadcast_arrays(np.asarray(strengths, dtype=float), np.asarray(polar, dtype=float))
     rays = np.stack([np.cos(angle), np.zeros(angle.shape), np.sin(angle)], axis=-1)
-    radius = np.full(angle.shape, 0.02)
+    radius: Floats = np.full(angle.shape, 0.02)
     for _ in range(200):
         size = np.linalg.norm(field.B(radius[..., None] * rays, outside="extrapolate"), axis=-1)
         factor = np.clip(np.cbrt(size / strength), 0.1, 10.0)
-        radius = radius * factor
+        radius = np.asarray(radius * factor)
         if np.abs(factor - 1).max(initial=0) < 1e-13:
             return radius
     if np.abs(factor - 1).max() < 1e-10:
@@ -247,7 +254,8 @@ def _power_law(strengths: Floats, lengths: Floats) -> PowerLaw:
     b, c = strengths / 1e-4, lengths * 1e3
 
     def residuals(parameters: Floats) -> Floats:
-        return parameters[0] * b ** parameters[1] + parameters[2] - c
+        off: Floats = parameters[0] * b ** parameters[1] + parameters[2] - c
+        return off
 
     start = [float(np.interp(1.0, b[b.argsort()], c[b.argsort()])), -1 / 3, 0.0]
     found = least_squares(residuals, start, method="lm", xtol=1e-14, ftol=1e-14, gtol=1e-14).x
@@ -279,7 +287,7 @@ def _fourier_series(values: Floats) -> FourierSeries:
 
 
 def _cosine_sum(values: Floats) -> CosineSum:
-    """The largest terms of the discrete Fourier transform, then least squares in all amplitudes, frequencies, phases."""
+    """The largest terms of the discrete Fourier transform, then least squares in all that is free."""
     spectrum = np.fft.rfft(values)[1 : values.size // 2] * 2 / values.size
     largest = np.sort(np.argsort(-np.abs(spectrum))[:_ANGLE_TERMS])
     frequency = (largest + 1) / (2 * np.pi)
@@ -292,7 +300,8 @@ def _cosine_sum(values: Floats) -> CosineSum:
 
     def residuals(parameters: Floats) -> Floats:
         mean, amplitude, turned = parts(parameters)
-        return mean + np.cos(turned) @ amplitude - values
+        off: Floats = mean + np.cos(turned) @ amplitude - values
+        return off
 
     def jacobian(parameters: Floats) -> Floats:
         _, amplitude, turned = parts(parameters)

@@ -27,7 +27,7 @@ def least_absolute_normal(directions: ArrayLike) -> Vectors:
     products = np.where(counts, np.abs(np.einsum("mni,mi->mn", flat, normal)), np.inf)
     pivot = products.argmin(axis=-1)
     least = np.where(counts, products, 0.0).sum(axis=-1)
-    running = np.arange(flat.shape[0])
+    running = np.flatnonzero(counts.any(axis=-1))
     for step in range(_MOST_STEPS):
         if not running.size:
             break

@@ -16,19 +16,19 @@ From samples to a pose, as printed:
 7. The signs c_1 and c_2 for which p̂_m is nearest to the prior position's direction (6.14).
 
 **Why 6.11 and 6.13 hold.** Seen from the rotor, let the sensor be at the polar angle θ in the plane of moment (x) and
-axis (z), 0 ≤ θ ≤ 90°. As the moment passes, a dipole's field there is b_max ∝ (3 cos²θ − 1, 0, 3 cos θ sin θ); a quarter
-of a turn later it is b_min ∝ (0, −1, 0). So the field turns about ω_b = b_max × b_min, along (3 cos θ sin θ, 0,
-1 − 3 cos²θ), which makes the angle α with p_e, tan α = 2 cot θ. A turn about b_min = −y runs from x towards z, just as θ
-does, so that ω_b stands at the polar angle θ − α: p̂_e = R_min(α) ω_b, and the axis, at 90°, is R_min(α − θ + π/2) ω_b.
-The rotor is seen at −p_e: c_1 = −1, c_2 = +1. Changing c_2 mirrors the pose in the plane of the field. In 6.13 as
-printed c_2 = −1 gives −R_min(−(α − θ) + π/2) = R_min(−(α − θ) − π/2), half a turn about b_min being −1 in the
-plane: 6.13 is ω_m = R_min(c_2 (α − θ + π/2)) ω_b, the mirror image, and right for both signs. The field of a dipole is even
-in p, hence c_1 in 6.11 and none in 6.13.
+axis (z), 0 ≤ θ ≤ 90°. As the moment passes, a dipole's field there is b_max ∝ (3 cos²θ − 1, 0, 3 cos θ sin θ); a
+quarter of a turn later it is b_min ∝ (0, −1, 0). So the field turns about ω_b = b_max × b_min, along (3 cos θ sin θ, 0,
+1 − 3 cos²θ), which makes the angle α with p_e, tan α = 2 cot θ. A turn about b_min = −y runs from x towards z, just as
+θ does, so that ω_b stands at the polar angle θ − α: p̂_e = R_min(α) ω_b, and the axis, at 90°, is R_min(α − θ + π/2)
+ω_b. The rotor is seen at −p_e: c_1 = −1, c_2 = +1. Changing c_2 mirrors the pose in the plane of the field. In 6.13 as
+printed c_2 = −1 gives −R_min(−(α − θ) + π/2) = R_min(−(α − θ) − π/2), half a turn about b_min being −1 in the plane:
+6.13 is ω_m = R_min(c_2 (α − θ + π/2)) ω_b, the mirror image, and right for both signs. The field of a dipole is even in
+p, hence c_1 in 6.11 and none in 6.13.
 
 What is not right in 6.13 is that β stands there for θ: see `isolines`, whose `parametrisation` mends it.
 
-**What the printed text leaves open.** The sign of ω_b (6.7 has ±), which 6.13 hands on to ω_m: here it is taken from the
-sense in which successive samples turn, so that the rotor turns right-handed about `axis`; that needs more than two
+**What the printed text leaves open.** The sign of ω_b (6.7 has ±), which 6.13 hands on to ω_m: here it is taken from
+the sense in which successive samples turn, so that the rotor turns right-handed about `axis`; that needs more than two
 samples a turn. The sign of b_min is arbitrary and c_2 takes it up.
 
 Of the prior, 6.14 uses the direction alone. A wrong c_2 turns p̂_m by 2α and the axis by twice 90° − (θ − α), about as a
@@ -53,6 +53,7 @@ BRANCHES: Integers = np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]])
 LARGEST_RATIO = 2.0
 """b_ratio of a dipole is between 1 and this."""
 
+_ROUNDING = 1e-13  # of the static field: what is less is no motion
 _FEWEST = 6  # samples: five numbers of the conic, and the mean
 
 
@@ -60,8 +61,8 @@ _FEWEST = 6  # samples: five numbers of the conic, and the mean
 class FieldEllipse:
     """The ellipse that a rotating field's samples trace (6.3.6).
 
-    static: (..., 3) T.  axis: (..., 3) unit, about which the field turns right-handed.  greatest, least: (..., 3) T, the
-    semi-axes b_max and b_min, each up to its sign; NaN where the samples' conic is no ellipse.
+    static: (..., 3) T.  axis: (..., 3) unit, about which the field turns right-handed.  greatest, least: (..., 3) T,
+    the semi-axes b_max and b_min, each up to its sign; NaN where the samples' conic is no ellipse.
     """
 
     static: Vectors
@@ -72,12 +73,14 @@ class FieldEllipse:
     @property
     def strength(self) -> Floats:
         """|b_max| (...) T, the isoline's field strength."""
-        return np.linalg.norm(self.greatest, axis=-1)
+        strength: Floats = np.linalg.norm(self.greatest, axis=-1)
+        return strength
 
     @property
     def ratio(self) -> Floats:
         """|b_max| / |b_min| (...) as measured, before it is limited to 2."""
-        return self.strength / np.linalg.norm(self.least, axis=-1)
+        ratio: Floats = self.strength / np.linalg.norm(self.least, axis=-1)
+        return ratio
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,8 +120,8 @@ def localize_as_published(
 ) -> PublishedPose:
     """Poses of a rotor from samples (..., n, 3) T of one sensor at times (n,) s; NaN samples are missing.
 
-    near: (..., 3) m, the prior position that chooses the branch (6.14). There is no starting from nothing: the algorithm
-    cannot tell its four branches by itself.
+    near: (..., 3) m, the prior position that chooses the branch (6.14). There is no starting from nothing: the
+    algorithm cannot tell its four branches by itself.
 
     Raises InputError for arrays that do not fit, or fewer than six samples.
     """
@@ -171,7 +174,9 @@ def field_ellipse(samples: ArrayLike, times: ArrayLike) -> FieldEllipse:
     if given.ndim < 2 or given.shape[-1] != 3:
         raise InputError(f"samples must have shape (..., n, 3), got {given.shape}")
     if moments.shape != given.shape[-2:-1] or not np.isfinite(moments).all():
-        raise InputError(f"times must be {given.shape[-2]} finite numbers, one for each sample, got shape {moments.shape}")
+        raise InputError(
+            f"times must be {given.shape[-2]} finite numbers, one for each sample, got shape {moments.shape}"
+        )
     given = given[..., moments.argsort(kind="stable"), :]
     present = np.isfinite(given).all(axis=-1)
     count = present.sum(axis=-1)
@@ -180,6 +185,7 @@ def field_ellipse(samples: ArrayLike, times: ArrayLike) -> FieldEllipse:
     static = np.where(present[..., None], given, 0.0).sum(axis=-2) / count[..., None]
     moving = np.where(present[..., None], given - static[..., None, :], 0.0)
     size = np.linalg.norm(moving, axis=-1, keepdims=True)
+    moving = np.where(size > _ROUNDING * np.linalg.norm(static, axis=-1)[..., None, None], moving, 0.0)
     axis = least_absolute_normal(np.divide(moving, size, out=np.zeros_like(moving), where=size > 0))
     turned = np.cross(moving[..., :-1, :], moving[..., 1:, :]).sum(axis=-2)  # missing samples are zero
     axis = axis * np.where((turned * axis).sum(axis=-1, keepdims=True) < 0, -1.0, 1.0)
@@ -226,11 +232,15 @@ def _chosen(ellipse: FieldEllipse, isolines: IsolineFunctions, prior: Points) ->
 def _nearest(positions: Points, prior: Points) -> Integers:
     """The branch (...) of positions (..., 4, 3) at the least angle from the prior (..., 3)."""
     cosines = (positions * prior[..., None, :]).sum(axis=-1)  # all four at one distance
-    return np.nan_to_num(cosines, nan=-np.inf).argmax(axis=-1)
+    nearest: Integers = np.nan_to_num(cosines, nan=-np.inf).argmax(axis=-1)
+    return nearest
 
 
 def _turned(vectors: Vectors, axes: Vectors, angles: Floats) -> Vectors:
     """Vectors (..., 3) turned about perpendicular axes (..., 3) of any length through angles (..., b): (..., b, 3)."""
     unit = axes / np.linalg.norm(axes, axis=-1, keepdims=True)
     across = np.cross(unit, vectors)
-    return vectors[..., None, :] * np.cos(angles)[..., None] + across[..., None, :] * np.sin(angles)[..., None]
+    turned: Vectors = (
+        vectors[..., None, :] * np.cos(angles)[..., None] + across[..., None, :] * np.sin(angles)[..., None]
+    )
+    return turned
