@@ -84,7 +84,9 @@ class FourierSeries:
         return slopes
 
     def _turned(self, beta: ArrayLike) -> Floats:
-        return np.multiply.outer(np.asarray(beta, dtype=float), self.frequency * np.arange(1, self.cosine.size + 1))
+        order = np.arange(1, self.cosine.size + 1)
+        turned: Floats = np.multiply.outer(np.asarray(beta, dtype=float), self.frequency * order)
+        return turned
 
 
 @dataclass(frozen=True, eq=False)
