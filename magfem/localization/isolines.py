@@ -25,7 +25,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import Literal, TypeAlias, get_args
 
 import numpy as np
@@ -33,8 +32,8 @@ from scipy.optimize import least_squares, minimize_scalar
 
 from magfem.errors import ConvergenceError, InputError
 from magfem.fields.field import Field
-from magfem.fitting.model import load_model
 from magfem.localization.ellipse_fit import principal_axes
+from magfem.localization.rotor import Model, as_rotor
 from magfem.typing import ArrayLike, Floats, Vectors
 
 Parametrisation: TypeAlias = Literal["eccentric", "polar"]
@@ -166,20 +165,18 @@ class IsolineFunctions:
 
 
 def isoline_functions(
-    model: Field | str | Path,
+    model: Model,
     parametrisation: Parametrisation = "eccentric",
     strengths: ArrayLike = STRENGTHS,
     fitted_at: float = FITTED_AT,
 ) -> IsolineFunctions:
-    """Fit the isoline functions to a rotor's field: a Field, or a model by its name or path. Takes about a second.
+    """Fit the isoline functions to a rotor: its field model, or the model's name or file. Takes about 0.1 s.
 
     strengths: (s,) T, at least four isolines for the power laws. fitted_at: T, the isoline of the other two.
 
     Raises InputError for what cannot be used, ConvergenceError where the field has no such isolines.
     """
-    field = load_model(model) if isinstance(model, (str, Path)) else model
-    if field.unit != "T":
-        raise InputError("isoline functions need a rotor's field in T, got one per ampere: multiply it by its current")
+    field = as_rotor(model).field
     if parametrisation not in get_args(Parametrisation):
         raise InputError(f'parametrisation must be "eccentric" or "polar", got {parametrisation!r}')
     levels = np.asarray(strengths, dtype=float)

@@ -156,7 +156,7 @@ def test_what_cannot_be_used_is_refused():
         isoline_functions(DIPOLE, strengths=[1e-5, 2e-5, 2e-5, 1e-5])
     with pytest.raises(InputError, match="fitted_at"):
         isoline_functions(DIPOLE, fitted_at=-1.0)
-    with pytest.raises(InputError, match="per ampere"):
+    with pytest.raises(InputError, match="in T"):
         isoline_functions("stator_1.6x5.5_inner")
     with pytest.raises(ConvergenceError, match="does not fall off"):
         isoline_radii(UniformField([1e-5, 0, 0]), STRENGTHS, 0.0)
