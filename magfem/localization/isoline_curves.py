@@ -6,9 +6,9 @@ A pose is read off from b_ratio: an error of it becomes one of β by ∂β/∂b_
     b_ratio = √(1 + 3 cos²θ)       ∂b_ratio/∂θ = −3 cos θ sin θ / b_ratio
     tan α = 2 |cot θ|              ∂α/∂θ = −2 / (1 + 3 cos²θ), its sign changing with that of cos θ
 
-so that β is lost where b_ratio has no slope, at 0° and 90°, while α's slope grows from −1/2 to −2: it amplifies errors of
-θ beyond 54.7°, where 3 cos²θ = 1. The dissertation's β is the eccentric angle (see `isolines`), by tan θ = (c_z / c_x)
-tan β and dθ/dβ = c_x c_z / (c_x² cos²β + c_z² sin²β).
+so that β is lost where b_ratio has no slope, at 0° and 90°, while α's slope grows from −1/2 to −2: it amplifies errors
+of θ beyond 54.7°, where 3 cos²θ = 1. The dissertation's β is the eccentric angle (see `isolines`), by tan θ =
+(c_z / c_x) tan β and dθ/dβ = c_x c_z / (c_x² cos²β + c_z² sin²β).
 """
 
 from __future__ import annotations

@@ -36,7 +36,7 @@ def position_picture(curves: IsolineCurves) -> Picture:
             axes.plot(degrees, fit * MILLI, color=colour, linewidth=1, label=f"{strength * MICRO:.4g} µT")
         axes.plot([], [], color=GREY, linewidth=2.2, alpha=0.45, label="field model")
         axes.plot([], [], color=GREY, linewidth=1, label="ellipse, power laws (6.4)")
-        axes.set(ylabel="distance |p$_e$| (mm)", ylim=(0, None))
+        axes.set(ylabel="distance |p$_\\mathrm{e}$| (mm)", ylim=(0, None))
         _all_round(axes, curves)
         drawn.legend(loc="outside lower center", ncols=4)
         content = png(drawn)
@@ -58,7 +58,7 @@ def angular_picture(curves: IsolineCurves) -> Picture:
         drawn = figure(4.4, _WIDE)
         upper, lower = drawn.subplots(2, sharex=True)
         for axes, fit, field, scale, label in (
-            (upper, curves.fitted.ratio, curves.field_ratio, 1.0, "field ratio b$_{ratio}$"),
+            (upper, curves.fitted.ratio, curves.field_ratio, 1.0, "field ratio b$_\\mathrm{ratio}$"),
             (lower, curves.fitted.angle, curves.field_angle, np.degrees(1.0), "field angle α (deg)"),
         ):
             axes.plot(degrees, scale * field, color=INK, linewidth=3, alpha=0.25, label="field model at 100 µT")
@@ -74,7 +74,7 @@ def angular_picture(curves: IsolineCurves) -> Picture:
         content,
         "Field ratio and field angle along the position angle, of the field model and by their fits.",
         f"Field ratio by a Fourier series of eight terms, off by at most {ratio_off:.1g}, and field angle by twenty "
-        f"cosines, off by at most {angle_off:.2g}°, at its corners (Fig. 6.4f). Each ratio stands for four values of β.",
+        f"cosines, off by up to {angle_off:.2g}° near its corners (Fig. 6.4f). Each ratio stands for four values of β.",
     )
 
 
@@ -84,12 +84,12 @@ def sensitivity_picture(curves: IsolineCurves) -> Picture:
     degrees, one = np.degrees(curves.beta[quarter]), np.degrees(1.0)
     fit, dipole = curves.fitted, curves.dipole
     panels: list[tuple[str, Floats, Floats, tuple[float, float]]] = [
-        ("b$_{ratio}$", fit.ratio, dipole.ratio, (0.95, 2.05)),
+        ("b$_\\mathrm{ratio}$", fit.ratio, dipole.ratio, (0.95, 2.05)),
         ("α (deg)", one * fit.angle, one * dipole.angle, (-2.0, 92.0)),
-        ("∂b$_{ratio}$/∂β (1/deg)", fit.ratio_slope / one, dipole.ratio_slope / one, (-0.025, 0.002)),
+        ("∂b$_\\mathrm{ratio}$/∂β (1/deg)", fit.ratio_slope / one, dipole.ratio_slope / one, (-0.025, 0.002)),
         ("∂α/∂β", fit.angle_slope, dipole.angle_slope, (-3.2, 0.6)),
-        ("∂β/∂b$_{ratio}$ (deg)", one * fit.beta_sensitivity, one * dipole.beta_sensitivity, (-300.0, 15.0)),
-        ("∂α/∂b$_{ratio}$ (deg)", one * fit.angle_sensitivity, one * dipole.angle_sensitivity, (-15.0, 300.0)),
+        ("∂β/∂b$_\\mathrm{ratio}$ (deg)", one * fit.beta_sensitivity, one * dipole.beta_sensitivity, (-300.0, 15.0)),
+        ("∂α/∂b$_\\mathrm{ratio}$ (deg)", one * fit.angle_sensitivity, one * dipole.angle_sensitivity, (-15.0, 300.0)),
     ]
     with drawing():
         drawn = figure(6.4, _WIDE)
