@@ -6,15 +6,15 @@ the stator's field, averaged over the rotor, as a compass needle would: in 1 mT 
 milliseconds, so that at some turns per second it lies along the field. Two things reach the sensor:
 
 *The field that is added.* Far away it is that of a moment. Its part that turns with the rotor adds to the rotor's
-moment, which the dissertation reckons with: m becomes m + m_s, m_s = I (m_inner,x + m_outer,y)/2, and the distance comes
-out short by the share m_s/(3m). The part that turns the other way, I (m_inner,x − m_outer,y)/2, is the smaller the more
-alike the coils are.
+moment, which the dissertation reckons with: m becomes m + m_s, m_s = I (m_inner,x + m_outer,y)/2, and the distance
+comes out short by the share m_s/(3m). The part that turns the other way, I (m_inner,x − m_outer,y)/2, is the smaller the
+more alike the coils are.
 
 *The turning that is uneven.* The coils' fields in the rotor are neither equal nor quite perpendicular, so the stator's
 field there is an ellipse, and a needle that follows it does not turn evenly: its angle is φ + ε sin(2φ + …). The
 rotor's moment then has a part of the share ε/2 that turns the other way: it makes b_ratio wrong, hence β, α and the
-axis. Currents in the inverse ratio of the coils' fields mend part of it, and a phase that makes up for the angle between
-them the rest. Friction, which adds a lag, is left out.
+axis. Currents in the inverse ratio of the coils' fields mend part of it, and a phase that makes up for the angle
+between them the rest. Friction, which adds a lag, is left out.
 
 The coils' models are closed paths of current (Biot–Savart along the lines of the solved current). Their regions are
 where they were checked, 0.3 to 2.7 mm from the stator, but a path's field is exact wherever the path is thin beside the
@@ -59,7 +59,8 @@ _QUIET = Sensor(noise=1e-9)  # T; poses of noiseless samples are looked for
 class Stator:
     """Two coils about the rotor.
 
-    inner, outer: their fields, T/A, in the motor's frame.  current: A, the amplitude.  diameter, length: m, the rotor's.
+    inner, outer: their fields, T/A, in the motor's frame.  current: A, the amplitude.  diameter, length: m, of the
+    rotor.
     """
 
     inner: Field

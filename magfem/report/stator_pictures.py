@@ -1,4 +1,4 @@
-"""Pictures of the stator's influence: its field beside the rotor's (Fig. S6.6b), and what it does to localized poses."""
+"""Pictures of the stator's influence: its field beside the rotor's (Fig. S6.6b), and the bias of localized poses."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from magfem.typing import Floats
 MILLI, MICRO = 1e3, 1e6
 _WIDE = 7.4  # inches
 _PUBLISHED = (10.0, 100.0)  # "one to two orders", 6.2
-_TICKS = np.array([5, 10, 15, 20, 30, 40])
+_TICKS = (5, 10, 15, 20, 30, 40)
 
 
 def draw(influence: StatorInfluence) -> list[Picture]:
@@ -51,8 +51,8 @@ def field_picture(influence: StatorInfluence) -> Picture:
         "stator_field",
         content,
         "Fields of rotor and stator over the distance, and their ratio.",
-        f"Fields of the rotor and of the stator at quadrature currents of {MILLI * influence.current:.4g} mA, the greatest "
-        f"of a turn, and their ratio, {low:.0f} to {high:.0f} (Fig. S6.6b).",
+        f"Fields of the rotor and of the stator at quadrature currents of {MILLI * influence.current:.4g} mA, the "
+        f"greatest of a turn, and their ratio, {low:.0f} to {high:.0f} (Fig. S6.6b).",
     )
 
 
@@ -60,24 +60,26 @@ def bias_picture(influence: StatorInfluence) -> Picture:
     """Errors of poses localized without noise: by the stator's field, and with the rotor's uneven turning."""
     distances = MILLI * influence.added.distances
     with drawing():
-        drawn = figure(3.5, _WIDE)
+        drawn = figure(3.7, _WIDE)
         left, right = drawn.subplots(1, 2)
         for bias, colour, name in (
             (influence.added, BLUE, "stator’s field added"),
-            (influence.uneven, ORANGE, "and uneven turning"),
+            (influence.uneven, ORANGE, "and the rotor’s uneven turning"),
         ):
-            left.loglog(distances, 100 * bias.position, color=colour, label=f"{name}: position")
-            left.loglog(distances, 100 * np.abs(bias.distance), color=colour, linestyle=":", label="distance, mean")
-            right.loglog(distances, np.degrees(bias.axis), color=colour, label=f"{name}: axis")
-            right.loglog(distances, np.degrees(bias.direction), color=colour, linestyle="--", label="direction")
-        left.set_ylabel("share of the distance (%)")
+            left.loglog(distances, 100 * bias.position, color=colour, label=name)
+            right.loglog(distances, np.degrees(bias.axis), color=colour)
+            right.loglog(distances, np.degrees(bias.direction), color=colour, linestyle="--")
+        left.loglog(
+            distances, 100 * np.abs(influence.added.distance), color=BLUE, linestyle=":", label="distance alone"
+        )
+        left.plot([], [], color=GREY, label="right: axis")
+        left.plot([], [], color=GREY, linestyle="--", label="right: direction of the position")
+        left.set_ylabel("position, share of the distance (%)")
         right.set_ylabel("angle (deg)")
         for axes in (left, right):
             _distance_axis(axes, distances)
             plain_log(axes.yaxis)
-            low, high = axes.get_ylim()
-            axes.set_ylim(low, high * 12)  # room for the legend
-            axes.legend(loc="upper right", ncols=1, fontsize=7.5)
+        drawn.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=3)
         content = png(drawn)
     return Picture(
         "stator_bias",
@@ -85,15 +87,15 @@ def bias_picture(influence: StatorInfluence) -> Picture:
         "Errors of localized poses that the stator makes, over the distance.",
         "What the stator does to a pose at β = 45°, without noise, at the worst azimuth. Its field acts like "
         f"{100 * influence.added_moment:.2g} % more moment. As the coils’ fields in the rotor are neither equal nor "
-        f"perpendicular, a rotor that follows them swings by {np.degrees(influence.unevenness):.2g}° twice a turn, which "
-        "matters more.",
+        f"perpendicular, a rotor that follows them swings by {np.degrees(influence.unevenness):.2g}° twice a turn, "
+        "which matters more.",
     )
 
 
 def _distance_axis(axes: Axes, distances: Floats) -> None:
     axes.set_xlabel("distance (mm)")
     axes.set_xlim(distances[0], distances[-1])
-    shown = _TICKS[(_TICKS >= distances[0] - 1e-9) & (_TICKS <= distances[-1] + 1e-9)]
+    shown = [tick for tick in _TICKS if distances[0] - 1e-9 <= tick <= distances[-1] + 1e-9]
     axes.set_xticks(shown, [str(tick) for tick in shown])
     axes.minorticks_off()
     grid(axes)
