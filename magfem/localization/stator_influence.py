@@ -7,8 +7,9 @@ milliseconds, so that at some turns per second it lies along the field. Two thin
 
 *The field that is added.* Far away it is that of a moment. Its part that turns with the rotor adds to the rotor's
 moment, which the dissertation reckons with: m becomes m + m_s, m_s = I (m_inner,x + m_outer,y)/2, and the distance
-comes out short by the share m_s/(3m). The part that turns the other way, I (m_inner,x − m_outer,y)/2, is the smaller the
-more alike the coils are.
+comes out short by the share m_s/(3m). The part that turns the other way, I (m_inner,x − m_outer,y)/2, is the smaller
+the more alike the coils are. Nearer, the turns at a coil's two ends run opposite ways round the motor, an axial
+quadrupole: beside the motor's ends, on its axis, the stator is strongest against the rotor.
 
 *The turning that is uneven.* The coils' fields in the rotor are neither equal nor quite perpendicular, so the stator's
 field there is an ellipse, and a needle that follows it does not turn evenly: its angle is φ + ε sin(2φ + …). The
