@@ -16,7 +16,7 @@ from scipy.stats import chi2
 
 from magfem.errors import InputError
 from magfem.localization.localize import localize, whitened
-from magfem.localization.motion import DIFFUSE, ProcessNoise, diffusion, transition, update
+from magfem.localization.motion import DIFFUSE, ProcessNoise, dynamics, update
 from magfem.localization.orientation import orientation
 from magfem.localization.pose import Pose
 from magfem.localization.refinement import Measured
@@ -153,10 +153,11 @@ def _first(pose: Pose, near: ArrayLike | None) -> _Prior:
 
 def _predicted(belief: Belief, pose: Pose, time: float, noise: ProcessNoise) -> _Prior:
     """Every hypothesis at the new time, to be met from where it is expected and from each branch of the window."""
-    duration = time - belief.time
-    F = transition(duration)
-    state = belief.state @ F.T
-    covariance = F @ belief.state_covariance @ F.T + diffusion(noise, duration)
+    turning = belief.state[:, 3:6] / np.linalg.norm(belief.state[:, 3:6], axis=-1, keepdims=True)
+    motion = dynamics(np.full(len(turning), time - belief.time), turning, belief.state[:, 9:])
+    state = np.einsum("hij,hj->hi", motion.F, belief.state) + motion.c
+    covariance = motion.F @ belief.state_covariance @ np.swapaxes(motion.F, -1, -2)
+    covariance += float(noise.position) * motion.position + float(noise.axis) * motion.axis
     offered_position, offered_frame = _offered(pose)
     hypotheses, starts = len(state), 1 + len(offered_position)
     axis = state[:, 3:6] / np.linalg.norm(state[:, 3:6], axis=-1, keepdims=True)

@@ -1,7 +1,9 @@
 """How a tracked magnet moves between its poses: with nearly constant velocities, and Gaussian statistics of that.
 
-The state of a track is (p, a, ṗ, ȧ), twelve numbers: position and axis, and their rates. White acceleration drives
-both. The axis is a vector in space; that it has length one is a measurement, taken with every pose.
+The state of a track is (p, a, ṗ, ω), twelve numbers: position, axis, velocity, and the angular velocity that turns the
+axis, ȧ = ω × a. White noise drives ṗ and ω, so that an axis that keeps turning about anything needs none. The axis is a
+vector in space; that it has length one is a measurement, taken with every pose. The motion of the axis is linearised
+about the track that is known so far.
 
 Poses enter as what the samples say near a point x₀ = (p₀, a₀), a quadratic log likelihood
 
@@ -16,21 +18,79 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from magfem.typing import Floats
+from magfem.cross_matrix import cross_matrix
+from magfem.localization.orientation import rotation_matrix
+from magfem.typing import Floats, Vectors
 
 DIFFUSE = np.repeat([0.2, 1.0, 0.02, 0.1], 3) ** 2
-"""Variances of position (m²), axis, velocity (m²/s²) and rate (1/s²) before anything was measured."""
+"""Variances of position (m²), axis, velocity (m²/s²) and angular velocity (rad²/s²) before anything was measured."""
 
 
 @dataclass(frozen=True, eq=False)
 class ProcessNoise:
-    """Spectral densities (...) of the acceleration that drives a track: position, m²/s³; axis, rad²/s³.
+    """Spectral densities (...) of the accelerations that drive a track: position, m²/s³; axis, rad²/s³.
 
-    After a time t at rest they have moved a magnet by about √(position t³/3) in every direction.
+    After a time t at rest they have moved a magnet by about √(position t³/3) in every direction, and turned its axis by
+    about √(axis t³/3) either way.
     """
 
+    position: Floats | float
+    axis: Floats | float
+
+
+@dataclass(frozen=True, eq=False)
+class Dynamics:
+    """From each of w times to the next: x → F x + c, F (w − 1, 12, 12), c (w − 1, 12).
+
+    position, axis: (w − 1, 12, 12), what noise of density one adds to the covariance.
+    """
+
+    F: Floats
+    c: Floats
     position: Floats
     axis: Floats
+
+    def diffusion(self, noise: ProcessNoise, step: int) -> Floats:
+        """(..., 12, 12) what `noise` adds in one step."""
+        densities = (np.asarray(one, dtype=float)[..., None, None] for one in (noise.position, noise.axis))
+        return np.asarray(
+            sum(d * unit for d, unit in zip(densities, (self.position[step], self.axis[step]), strict=True))
+        )
+
+
+def dynamics(durations: Floats, axis: Vectors, spin: Vectors) -> Dynamics:
+    """The motion over `durations` (k,) s, near axes (k, 3) that turn with `spin` (k, 3) rad/s when each begins."""
+    count, t = len(durations), durations[:, None, None]
+    turn = rotation_matrix(durations[:, None] * spin)
+    after = np.einsum("kij,kj->ki", turn, axis)
+    lever = -cross_matrix(after) @ _left_jacobian(durations[:, None] * spin)  # d(after) of a small turn
+    F = np.tile(np.eye(12), (count, 1, 1))
+    F[:, :3, 6:9] = t * np.eye(3)
+    F[:, 3:6, 3:6] = turn
+    F[:, 3:6, 9:] = t * lever
+    c = np.zeros((count, 12))
+    c[:, 3:6] = -durations[:, None] * np.einsum("kij,kj->ki", lever, spin)
+    position, turning = np.zeros((count, 12, 12)), np.zeros((count, 12, 12))
+    one = np.broadcast_to(np.eye(3), (count, 3, 3))
+    for Q, rows, rates, G in (
+        (position, slice(0, 3), slice(6, 9), one),
+        (turning, slice(3, 6), slice(9, 12), -cross_matrix(after)),
+    ):
+        Q[:, rows, rows] = t**3 / 3 * (G @ np.swapaxes(G, -1, -2))
+        Q[:, rows, rates] = t**2 / 2 * G
+        Q[:, rates, rows] = t**2 / 2 * np.swapaxes(G, -1, -2)
+        Q[:, rates, rates] = t * one
+    return Dynamics(F, c, position, turning)
+
+
+def _left_jacobian(vector: Vectors) -> Floats:
+    """(..., 3, 3) what a change of a rotation vector (..., 3) turns by: ∫₀¹ exp(s [v]×) ds."""
+    angle = np.linalg.norm(vector, axis=-1)[..., None, None]
+    K = cross_matrix(vector)
+    small = angle < 1e-3
+    safe = np.where(small, 1.0, angle)
+    second = np.where(small, 1 / 6, (safe - np.sin(safe)) / safe**3)
+    return np.asarray(np.eye(3) + 0.5 * np.sinc(angle / (2 * np.pi)) ** 2 * K + second * (K @ K))
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,20 +110,6 @@ class Smoothed:
     state: Floats
     covariance: Floats
     log_evidence: Floats
-
-
-def transition(duration: float) -> Floats:
-    """(12, 12) from one time to another `duration` s later."""
-    return np.eye(12) + duration * np.eye(12, k=6)
-
-
-def diffusion(noise: ProcessNoise, duration: float) -> Floats:
-    """(..., 12, 12) what white acceleration adds to the covariance in `duration` s."""
-    t = duration
-    rates = np.stack([noise.position] * 3 + [noise.axis] * 3, axis=-1)  # (..., 6)
-    block = np.array([[t**3 / 3, t**2 / 2], [t**2 / 2, t]])
-    Q = np.einsum("ij,...k,kl->...ikjl", block, rates, np.eye(6))
-    return np.asarray(Q.reshape(*rates.shape[:-1], 12, 12))
 
 
 def update(
@@ -102,18 +148,17 @@ class Filtered:
     log_evidence: Floats
 
 
-def kalman_filter(times: Floats, measured: Likelihoods, noise: ProcessNoise) -> Filtered:
-    """The states given all measurements up to each time, at `times` (w,) s, from a diffuse prior about the first."""
+def kalman_filter(measured: Likelihoods, motion: Dynamics, noise: ProcessNoise) -> Filtered:
+    """The states given all measurements up to each time, from a diffuse prior about the first."""
     lead = np.broadcast_shapes(measured.misfit.shape[:-1], np.shape(noise.position))
     m = np.zeros((*lead, 12))
     m[..., :6] = measured.place[..., 0, :]
     P = np.broadcast_to(np.diag(DIFFUSE), (*lead, 12, 12))
     before_m, before_P, after_m, after_P, evidences = [], [], [], [], []
-    for k in range(times.size):
+    for k in range(measured.misfit.shape[-1]):
         if k:
-            duration = float(times[k] - times[k - 1])
-            F = transition(duration)
-            m, P = _times(F, m), F @ P @ F.T + diffusion(noise, duration)
+            F = motion.F[k - 1]
+            m, P = _times(F, m) + motion.c[k - 1], F @ P @ F.T + motion.diffusion(noise, k - 1)
         before_m.append(m)
         before_P.append(P)
         m, P, evidence = update(
@@ -130,15 +175,14 @@ def kalman_filter(times: Floats, measured: Likelihoods, noise: ProcessNoise) -> 
     return Filtered(before_m, before_P, after_m, after_P, np.stack(evidences, axis=-1))
 
 
-def smooth(times: Floats, measured: Likelihoods, noise: ProcessNoise) -> Smoothed:
+def smooth(measured: Likelihoods, motion: Dynamics, noise: ProcessNoise) -> Smoothed:
     """The states given all measurements, before and after (Rauch, Tung and Striebel)."""
-    forward = kalman_filter(times, measured, noise)
+    forward = kalman_filter(measured, motion, noise)
     m, P = forward.state[-1], forward.covariance[-1]
     states, covariances = [m], [P]
-    for k in range(times.size - 2, -1, -1):
-        F = transition(float(times[k + 1] - times[k]))
+    for k in range(len(forward.state) - 2, -1, -1):
         # G = P Fᵀ P₋⁻¹, by a solve with the symmetric P₋.
-        G = np.swapaxes(np.linalg.solve(forward.covariance_before[k + 1], F @ forward.covariance[k]), -1, -2)
+        G = np.swapaxes(np.linalg.solve(forward.covariance_before[k + 1], motion.F[k] @ forward.covariance[k]), -1, -2)
         m = forward.state[k] + _times(G, m - forward.state_before[k + 1])
         P = forward.covariance[k] + G @ (P - forward.covariance_before[k + 1]) @ np.swapaxes(G, -1, -2)
         states.append(m)

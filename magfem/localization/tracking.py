@@ -20,7 +20,7 @@ from scipy.stats import chi2
 
 from magfem.errors import ConvergenceError, InputError
 from magfem.localization.localize import localize, whitened
-from magfem.localization.motion import Likelihoods, ProcessNoise, Smoothed, kalman_filter, smooth
+from magfem.localization.motion import Dynamics, Likelihoods, ProcessNoise, Smoothed, dynamics, kalman_filter, smooth
 from magfem.localization.orientation import orientation
 from magfem.localization.pose import Pose
 from magfem.localization.rotor import Model, as_rotor
@@ -39,7 +39,11 @@ ALTERNATIVES = 4
 NEVER = 1e9  # cost of a branch that is none
 HOPELESS = 100.0  # cost of a path above the best beyond which it is not followed
 SETTLED = 3  # iterations after which the process noise changes little
-START = ProcessNoise(np.asarray(1e-8), np.asarray(1e-5))
+START = ProcessNoise(1e-8, 1e-5)
+DECADES = 1.5
+"""Deviation of the logarithms of process noise before anything was measured. Short tracks alone often prefer none, and
+would state too small a covariance."""
+
 LOGARITHMS = (-16.0, 2.0)  # of densities: between no noise at all and no memory
 
 
@@ -227,11 +231,14 @@ def _follow(
     used = START if noise is None else noise
     change = np.inf
     iterations = 0
+    spin: Floats = np.zeros_like(p)
     while True:
         measured, phase = likelihoods(seen, p, R, weight)
+        motion = dynamics(np.diff(times), R[:-1, :, 2], spin[:-1])
         if noise is None:
-            used = _process_noise(times, measured, used, iterations)
-        found = smooth(times, measured, used)
+            used = _process_noise(measured, motion, used, iterations)
+        found = smooth(measured, motion, used)
+        spin = found.state[:, 9:]
         if change < SMALL_CHANGE or iterations == MOST_ITERATIONS:
             break
         p, R, changes = moved(seen, p, R, found.state, phase)
@@ -242,7 +249,7 @@ def _follow(
     return _as_track(times, poses, found, used, weight < 1.0, change < SMALL_CHANGE, iterations)
 
 
-def _process_noise(times: Floats, measured: Likelihoods, last: ProcessNoise, iterations: int) -> ProcessNoise:
+def _process_noise(measured: Likelihoods, motion: Dynamics, last: ProcessNoise, iterations: int) -> ProcessNoise:
     """The densities that predict the windows best, each from those before it, on ever finer grids of their logarithms.
 
     Far from the end every iteration searches anew: what was found about a bad track may be far off.
@@ -253,10 +260,11 @@ def _process_noise(times: Floats, measured: Likelihoods, last: ProcessNoise, ite
         steps = np.linspace(-width, width, 7)
         first, second = (one.ravel() for one in np.meshgrid(centre[0] + steps, centre[1] + steps, indexing="ij"))
         first, second = np.clip(first, *LOGARITHMS), np.clip(second, *LOGARITHMS)
-        evidence = kalman_filter(times, measured, ProcessNoise(10**first, 10**second)).log_evidence.sum(axis=-1)
-        best = int(np.argmax(evidence))
+        evidence = kalman_filter(measured, motion, ProcessNoise(10**first, 10**second)).log_evidence.sum(axis=-1)
+        usual = (first - np.log10(float(START.position))) ** 2 + (second - np.log10(float(START.axis))) ** 2
+        best = int(np.argmax(evidence - 0.5 * usual / DECADES**2))
         centre = np.array([first[best], second[best]])
-    return ProcessNoise(np.asarray(10 ** centre[0]), np.asarray(10 ** centre[1]))
+    return ProcessNoise(float(10 ** centre[0]), float(10 ** centre[1]))
 
 
 def _as_track(

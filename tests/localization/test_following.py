@@ -10,7 +10,7 @@ from magfem.localization import Belief, ProcessNoise, Rotor, as_rotor, follow, t
 from magfem.typing import Floats
 from tests.localization.paths import PAIR, TIMES, degrees_between, helix, root_mean_square, seen, smooth_random
 
-NOISE = ProcessNoise(np.asarray(3e-9), np.asarray(3e-5))
+NOISE = ProcessNoise(3e-9, 3e-5)
 
 
 @pytest.fixture(scope="module")

@@ -4,12 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
-from magfem.localization.motion import DIFFUSE, Likelihoods, ProcessNoise, diffusion, kalman_filter, smooth, transition
+from magfem.localization.motion import DIFFUSE, Dynamics, Likelihoods, ProcessNoise, dynamics, kalman_filter, smooth
 from magfem.typing import Floats
 
 TIMES = np.array([0.0, 2.0, 3.0, 7.0, 8.5])
-NOISE = ProcessNoise(np.asarray(2e-7), np.asarray(3e-3))
+NOISE = ProcessNoise(2e-7, 3e-3)
+
+
+def turning(seed: int) -> Dynamics:
+    rng = np.random.default_rng(seed + 100)
+    axis = rng.normal(size=(TIMES.size - 1, 3))
+    axis /= np.linalg.norm(axis, axis=-1, keepdims=True)
+    return dynamics(np.diff(TIMES), axis, 0.2 * rng.normal(size=axis.shape))
 
 
 def drawn(seed: int) -> Likelihoods:
@@ -27,7 +35,7 @@ def drawn(seed: int) -> Likelihoods:
     return Likelihoods(place, gradient, information, rng.uniform(1, 9, count))
 
 
-def all_at_once(measured: Likelihoods) -> tuple[Floats, Floats, float]:
+def all_at_once(measured: Likelihoods, motion: Dynamics) -> tuple[Floats, Floats, float]:
     """Mean (w, 12) and covariance (12w, 12w) of all states, and the log evidence, from one Gaussian of 12 w numbers."""
     count = TIMES.size
     size = 12 * count
@@ -37,11 +45,11 @@ def all_at_once(measured: Likelihoods) -> tuple[Floats, Floats, float]:
     covariance[:12, :12] = np.diag(DIFFUSE)
     for k in range(1, count):
         now, last = slice(12 * k, 12 * k + 12), slice(12 * k - 12, 12 * k)
-        F = transition(TIMES[k] - TIMES[k - 1])
-        mean[now] = F @ mean[last]
+        F = motion.F[k - 1]
+        mean[now] = F @ mean[last] + motion.c[k - 1]
         covariance[now, : 12 * k] = F @ covariance[last, : 12 * k]
         covariance[: 12 * k, now] = covariance[now, : 12 * k].T
-        covariance[now, now] = F @ covariance[last, last] @ F.T + diffusion(NOISE, TIMES[k] - TIMES[k - 1])
+        covariance[now, now] = F @ covariance[last, last] @ F.T + motion.diffusion(NOISE, k - 1)
     rows = np.concatenate([12 * k + np.arange(6) for k in range(count)])
     Lambda = np.zeros((size, size))
     slope = np.zeros(size)
@@ -61,8 +69,9 @@ def all_at_once(measured: Likelihoods) -> tuple[Floats, Floats, float]:
 @pytest.mark.parametrize("seed", range(3))
 def test_smoother_is_the_gaussian_of_all_times(seed: int) -> None:
     measured = drawn(seed)
-    mean, covariance, evidence = all_at_once(measured)
-    found = smooth(TIMES, measured, NOISE)
+    motion = turning(seed)
+    mean, covariance, evidence = all_at_once(measured, motion)
+    found = smooth(measured, motion, NOISE)
     deviation = np.sqrt(np.diag(covariance)).reshape(mean.shape)
     assert np.abs((found.state - mean) / deviation).max() < 1e-6
     blocks = np.array([covariance[12 * k : 12 * k + 12, 12 * k : 12 * k + 12] for k in range(TIMES.size)])
@@ -71,23 +80,47 @@ def test_smoother_is_the_gaussian_of_all_times(seed: int) -> None:
     assert found.log_evidence.sum() == pytest.approx(evidence, abs=1e-6)
 
 
-def test_diffusion_is_that_of_white_acceleration() -> None:
-    """In two steps as in one, and as many small kicks make it."""
-    first, second = diffusion(NOISE, 1.5), diffusion(NOISE, 2.5)
-    F = transition(2.5)
-    np.testing.assert_allclose(F @ first @ F.T + second, diffusion(NOISE, 4.0), rtol=1e-12, atol=1e-30)
-    steps = 4000
-    left = 4.0 - (np.arange(steps) + 0.5) * 4.0 / steps  # time that a kick has to act
-    position = np.sum(left**2) * float(NOISE.position) * 4.0 / steps
-    assert diffusion(NOISE, 4.0)[0, 0] == pytest.approx(position, rel=1e-6)
+AXIS, SPIN = np.array([0.48, -0.6, 0.64]), np.array([0.3, -0.2, 0.5])
+
+
+def after(state: Floats, duration: float) -> Floats:
+    """The state later, the axis turned by SciPy's rotation."""
+    turn = Rotation.from_rotvec(duration * state[9:])
+    return np.concatenate([state[:3] + duration * state[6:9], turn.apply(state[3:6]), state[6:]])
+
+
+def test_dynamics_are_a_turning_axis_linearised() -> None:
+    motion = dynamics(np.array([1.7]), AXIS[None], SPIN[None])
+    state = np.concatenate([[0.01, 0.0, 0.02], AXIS, [1e-3, 2e-3, 0.0], SPIN])
+    np.testing.assert_allclose(motion.F[0] @ state + motion.c[0], after(state, 1.7), atol=1e-12)
+    step = 1e-5
+    columns = [(after(state + step * e, 1.7) - after(state - step * e, 1.7)) / (2 * step) for e in np.eye(12)]
+    np.testing.assert_allclose(motion.F[0], np.transpose(columns), atol=1e-9)
+
+
+def test_diffusion_is_that_of_many_small_kicks() -> None:
+    """Of velocity, and of angular velocity of an axis at rest, each with the time left to act."""
+    motion = dynamics(np.array([4.0]), AXIS[None], np.zeros((1, 3)))
+    steps = 20000
+    each = 4.0 / steps
+    total: Floats = np.zeros((12, 12))
+    across = np.cross(np.eye(3), AXIS).T  # ω × a, column by column
+    moments = [(each * (4.0 - (np.arange(steps) + 0.5) * each) ** power).sum() for power in (0, 1, 2)]
+    for rows, rates, lever, density in ((0, 6, np.eye(3), NOISE.position), (3, 9, across, NOISE.axis)):
+        p, v = slice(rows, rows + 3), slice(rates, rates + 3)
+        total[p, p] = density * moments[2] * lever @ lever.T
+        total[p, v] = density * moments[1] * lever
+        total[v, p] = total[p, v].T
+        total[v, v] = density * moments[0] * np.eye(3)
+    np.testing.assert_allclose(motion.diffusion(NOISE, 0), total, rtol=1e-6, atol=1e-18)
 
 
 def test_many_noises_at_once_are_each_alone() -> None:
-    measured = drawn(5)
-    several = ProcessNoise(np.array([1e-9, 2e-7]), np.array([1e-5, 3e-3]))
-    together = kalman_filter(TIMES, measured, several).log_evidence.sum(axis=-1)
+    measured, motion = drawn(5), turning(5)
+    several = np.array([1e-9, 2e-7]), np.array([1e-5, 3e-3])
+    together = kalman_filter(measured, motion, ProcessNoise(*several)).log_evidence.sum(axis=-1)
     alone = [
-        float(kalman_filter(TIMES, measured, ProcessNoise(np.asarray(a), np.asarray(b))).log_evidence.sum())
-        for a, b in zip(several.position, several.axis, strict=True)
+        float(kalman_filter(measured, motion, ProcessNoise(a, b)).log_evidence.sum())
+        for a, b in zip(*(one.tolist() for one in several), strict=True)
     ]
     np.testing.assert_allclose(together, alone, rtol=1e-12)

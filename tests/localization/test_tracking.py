@@ -9,7 +9,7 @@ import pytest
 
 from magfem.errors import InputError
 from magfem.localization import ProcessNoise, Rotor, as_rotor, track, windows
-from magfem.localization.motion import diffusion, transition
+from magfem.localization.motion import dynamics
 from magfem.typing import Points, Vectors
 from tests.localization.paths import (
     PAIR,
@@ -59,11 +59,12 @@ def drawn_path(noise: ProcessNoise, seed: int) -> tuple[Points, Vectors]:
     rng = np.random.default_rng(seed)
     state = np.zeros(12)
     state[:6] = 0.0, 0.002, 0.026, 0.6, 0.3, 0.74
-    F, factor = transition(2.0), np.linalg.cholesky(diffusion(noise, 2.0))
     places = []
     for _ in range(150):
-        places.append(state[:6])
-        state = F @ state + factor @ rng.normal(size=12)
+        places.append(state[:6].copy())
+        motion = dynamics(np.array([2.0]), state[None, 3:6], state[None, 9:])
+        state = rng.multivariate_normal(motion.F[0] @ state + motion.c[0], motion.diffusion(noise, 0), method="svd")
+        state[3:6] /= np.linalg.norm(state[3:6])
         state[6:9] -= 0.15 * state[6:9] + 0.02 * (state[:3] - [0.0, 0.0, 0.026])  # or it would leave
     both = np.array(places)
     return both[:, :3], unit(both[:, 3:])
@@ -72,7 +73,7 @@ def drawn_path(noise: ProcessNoise, seed: int) -> tuple[Points, Vectors]:
 @pytest.mark.parametrize("seed", range(2))
 def test_process_noise_is_found(rotor: Rotor, seed: int) -> None:
     """That of a path drawn with a known one, within what a hundred and fifty windows can tell."""
-    noise = ProcessNoise(np.asarray(3e-8), np.asarray(1e-6))
+    noise = ProcessNoise(3e-8, 1e-6)
     position, axis = drawn_path(noise, seed)
     found = track(seen(rotor, position, axis, PAIR, seed), TIMES, rotor, 1.0, PAIR, starts=2.0 * np.arange(150))
     assert abs(np.log10(found.noise.position / noise.position)) < 0.6
@@ -95,7 +96,10 @@ def test_a_faulty_window_is_named_and_moves_nothing(rotor: Rotor) -> None:
 
 
 def test_one_sensor_cannot_tell_a_track_from_its_mirror_image(rotor: Rotor) -> None:
-    position, axis = smooth_random(60, 4)
+    # Past the sensor with β between 40 and 60°: where β meets 0 or 90° a track could change to another branch as well.
+    along = np.linspace(-6e-3, 6e-3, 60)
+    position = np.stack([along - 0.01, 0 * along + 4e-3, 0 * along + 25e-3], axis=-1)
+    axis = np.tile(unit(np.array([0.3, 0.5, 0.8])), (60, 1))
     samples = seen(rotor, position, axis, PAIR[:1], 2)
     starts = 2.0 * np.arange(60)
     sensor = PAIR[0]
