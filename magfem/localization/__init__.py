@@ -1,0 +1,31 @@
+"""Localization: where a magnet is that turns about an axis, from the field that it makes at one sensor or more."""
+
+from magfem.localization.dipole_pose import DipolePoses, dipole_poses
+from magfem.localization.frequency import Frequency, Spectrum, find_frequency, spectrum
+from magfem.localization.localize import localize, localize_several, locate_field
+from magfem.localization.pose import Branch, Pose
+from magfem.localization.rotor import Rotor, as_rotor
+from magfem.localization.sensor import Sensor
+from magfem.localization.signal import RotatingField, demodulate, demodulate_several
+from magfem.localization.simulated import simulated_samples
+
+__all__ = [
+    "Branch",
+    "DipolePoses",
+    "Frequency",
+    "Pose",
+    "RotatingField",
+    "Rotor",
+    "Sensor",
+    "Spectrum",
+    "as_rotor",
+    "demodulate",
+    "demodulate_several",
+    "dipole_poses",
+    "find_frequency",
+    "localize",
+    "localize_several",
+    "locate_field",
+    "simulated_samples",
+    "spectrum",
+]

@@ -1,0 +1,173 @@
+"""The rotation frequency, found in the samples: a spectrum for the start, then least squares over all axes at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from magfem.errors import InputError
+from magfem.typing import ArrayLike, Booleans, Floats
+
+_PER_LINE = 4  # points of the spectrum per 1/(time sampled): a peak is met within an eighth of its width
+_MOST_STEPS = 30
+
+
+@dataclass(frozen=True, eq=False)
+class Frequency:
+    """A rotation frequency that may drift: the rotor has turned ∫f dt, f = at_middle + drift·(t − middle).
+
+    at_middle, deviation: (...) Hz, with its standard deviation; there it does not depend on the phase.  drift: (...)
+    Hz/s.  middle: s, the mean of the times.
+    """
+
+    at_middle: Floats
+    deviation: Floats
+    drift: Floats
+    middle: float
+
+    @property
+    def at_zero(self) -> Floats:
+        """(...) Hz at time zero."""
+        return self.at_middle - self.drift * self.middle
+
+    def turns(self, times: Floats) -> Floats:
+        """(..., n) turns since the middle, at `times` (n,) s."""
+        tau = times - self.middle
+        return self.at_middle[..., None] * tau + 0.5 * self.drift[..., None] * tau**2
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """frequencies (f,) Hz; power (..., f) T², of the sinusoid that fits best at each, its mean square over the axes."""
+
+    frequencies: Floats
+    power: Floats
+
+    @property
+    def peak(self) -> Floats:
+        """(...) Hz, where the power is largest."""
+        found: Floats = self.frequencies[np.argmax(self.power, axis=-1)]
+        return found
+
+
+def spectrum(
+    samples: ArrayLike, times: ArrayLike, frequencies: ArrayLike | None = None, highest: float | None = None
+) -> Spectrum:
+    """The spectrum of `samples` (..., n, 3) T, summed over their axes, gaps (NaN) allowed (Fig. 6.3h and i).
+
+    By least squares at every frequency for itself (Lomb's periodogram with a free mean), so sampling may be uneven.
+    frequencies: (f,) Hz; by default lines four to each 1/(time sampled), from one turn in that time to `highest`, which
+    is half the mean rate unless stated.
+    """
+    b, t = np.asarray(samples, dtype=float), np.asarray(times, dtype=float)
+    if b.ndim < 2 or t.shape != (b.shape[-2],) or t.size < 4 or not np.ptp(t) > 0:
+        raise InputError(
+            f"a spectrum needs samples (..., n, 3) and times (n,), n of 4 or more, got {b.shape}, {t.shape}"
+        )
+    used = np.isfinite(b)
+    lines = _lines(t, highest) if frequencies is None else np.asarray(frequencies, dtype=float)
+    return Spectrum(lines, _power(np.where(used, b, 0.0), t - t.mean(), used, lines))
+
+
+def find_frequency(
+    samples: ArrayLike,
+    times: ArrayLike,
+    near: ArrayLike | None = None,
+    *,
+    drift: bool = False,
+    weight: ArrayLike | None = None,
+) -> Frequency:
+    """The frequency of `samples` (..., n, c) T, whose c axes, of one sensor or many, all see one motor.
+
+    near: Hz, where to begin; None for the peak of the spectrum.  drift: whether the frequency may change.  weight:
+    (c,), one over the variance of a sample, T⁻²; None where all axes are equally noisy, by what is left over.
+
+    Variable projection: the amplitudes are eliminated at every step, so only frequency and drift are left, and
+    Gauss–Newton on these is exact where it ends. Raises InputError where no frequency is found.
+    """
+    b, t = np.asarray(samples, dtype=float), np.asarray(times, dtype=float)
+    used = np.isfinite(b)
+    b = np.where(used, b, 0.0)
+    lead, columns = b.shape[:-2], b.shape[-1]
+    middle, span = float(t.mean()), float(np.ptp(t))
+    tau = t - middle
+    weights = np.ones(columns) if weight is None else np.broadcast_to(np.asarray(weight, dtype=float), (columns,))
+    f = _start(b, t, used, near)
+    d: Floats = np.zeros(lead)
+    chosen = [0, 1] if drift else [0]
+    for _ in range(_MOST_STEPS):
+        information, gradient, misfit = _linearised(b, tau, used, f, d, weights)
+        information, gradient = information[..., chosen, :][..., chosen], gradient[..., chosen]
+        step = np.linalg.solve(information, gradient[..., None])[..., 0]
+        size = np.abs(step[..., 0]) * span
+        step = step * np.minimum(1.0, 0.25 / np.maximum(size, 1e-300))[..., None]  # beyond it has left the peak
+        f = f + step[..., 0]
+        if drift:
+            d = d + step[..., 1]
+        if np.all(size < 1e-13 * np.maximum(1.0, np.abs(f) * span)):
+            break
+    scale: Floats = np.ones(lead)
+    if weight is None:
+        scale = misfit / np.maximum(used.sum(axis=(-2, -1)) - 3 * columns - len(chosen), 1)
+    variance = scale * np.linalg.inv(information)[..., 0, 0]
+    if not np.all((f > 0) & (size < 1e-6) & (variance >= 0) & (variance * span**2 < 0.1)):
+        raise InputError(
+            "no rotation frequency stands out of the noise in these samples: state it, or take more or longer samples"
+        )
+    return Frequency(f, np.sqrt(variance), d, middle)
+
+
+def _start(b: Floats, t: Floats, used: Booleans, near: ArrayLike | None) -> Floats:
+    """(...) Hz, from where the frequency is refined."""
+    if near is None:
+        lines = _lines(t, None)
+        return np.array(lines[np.argmax(_power(b, t - t.mean(), used, lines), axis=-1)])
+    start = np.array(np.broadcast_to(np.asarray(near, dtype=float), b.shape[:-2]))
+    if not np.all(np.isfinite(start) & (start > 0)):
+        raise InputError(f"a rotation frequency must be a positive number in Hz, got {near!r}")
+    return start
+
+
+def _lines(t: Floats, highest: float | None) -> Floats:
+    span = np.ptp(t)
+    top = 0.5 * (t.size - 1) / span if highest is None else highest
+    step = 1 / (_PER_LINE * span)
+    lines = np.arange(1 / span, top, step)
+    if lines.size < 1:
+        raise InputError("the samples are too few or too short to look for a frequency: state it")
+    return lines
+
+
+def _power(b: Floats, tau: Floats, used: Booleans, lines: Floats) -> Floats:
+    """(..., f) T²: what the best sinusoid at each line takes off the mean square, summed over axes."""
+    count = np.maximum(used.sum(axis=-2, keepdims=True), 1)
+    centred = np.where(used, b - b.sum(axis=-2, keepdims=True) / count, 0.0)
+    angle = 2 * np.pi * lines[:, None] * tau
+    waves = np.exp(-1j * angle)  # (f, n)
+    amplitude = waves @ centred  # (..., f, 3)
+    power: Floats = 2 * np.sum(np.abs(amplitude) ** 2 / count**2, axis=-1)
+    return power
+
+
+def _linearised(
+    b: Floats, tau: Floats, used: Booleans, f: Floats, d: Floats, weight: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """Information (..., 2, 2) and gradient (..., 2) of (f, d), and the weighted misfit (...), amplitudes eliminated."""
+    turns = f[..., None] * tau + 0.5 * d[..., None] * tau**2
+    cos, sin = np.cos(2 * np.pi * turns), np.sin(2 * np.pi * turns)
+    X = (
+        np.stack([np.ones_like(cos), cos, sin], axis=-1)[..., None, :, :] * np.swapaxes(used, -1, -2)[..., None]
+    )  # (..., c, n, 3)
+    y = np.swapaxes(b, -1, -2)[..., None]  # (..., c, n, 1); zero where not used
+    Xt = np.swapaxes(X, -1, -2)
+    normal = np.linalg.inv(Xt @ X)
+    c = normal @ (Xt @ y)  # (..., c, 3, 1)
+    left = (y - X @ c)[..., 0]
+    speed = -c[..., 1, :] * sin[..., None, :] + c[..., 2, :] * cos[..., None, :]  # (..., c, n)
+    D = 2 * np.pi * np.stack([tau * speed, 0.5 * tau**2 * speed], axis=-1) * np.swapaxes(used, -1, -2)[..., None]
+    D = D - X @ (normal @ (Xt @ D))
+    information = np.einsum("...ank,...anl,a->...kl", D, D, weight)
+    gradient = np.einsum("...ank,...an,a->...k", D, left, weight)
+    misfit = np.einsum("...an,a->...", left**2, weight)
+    return information, gradient, misfit

@@ -1,0 +1,96 @@
+"""Three-axis magnetic sensors: where they are, how they read, how well."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+import numpy as np
+from scipy.spatial.transform import RigidTransform
+
+from magfem.errors import InputError
+from magfem.typing import ArrayLike, Floats, Vectors
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Sensor:
+    """A three-axis sensor; it reads gain @ B + offset of the field B (3,) T in its own frame.
+
+    pose: maps its frame to the common one.  noise: standard deviation of a sample, T, one number or (3,) for its axes;
+    None where it is to be found from the data.  resolution: T, the step that readings are rounded to.  saturation: T,
+    readings at or beyond it are not believed.  gain: (3, 3), sensitivities and cross axes.  offset: (3,) T.
+
+    Raises InputError for what no sensor can be.
+    """
+
+    pose: RigidTransform = field(default_factory=RigidTransform.identity)
+    noise: ArrayLike | None = None
+    resolution: float = 0.0
+    saturation: float = np.inf
+    gain: ArrayLike = field(default_factory=lambda: np.eye(3))
+    offset: ArrayLike = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.pose, RigidTransform) or not self.pose.single:
+            raise InputError("sensor: pose must be one scipy.spatial.transform.RigidTransform")
+        if self.noise is not None:
+            noise = np.asarray(self.noise, dtype=float)
+            if noise.shape not in ((), (3,)) or not np.all((noise >= 0) & np.isfinite(noise)):
+                raise InputError(f"sensor: noise must be one or three standard deviations in T, got {self.noise!r}")
+            object.__setattr__(self, "noise", np.broadcast_to(noise, (3,)).copy())
+        if not 0 <= self.resolution < np.inf:
+            raise InputError(f"sensor: resolution must be a step in T, or zero, got {self.resolution!r}")
+        if not self.saturation > 0:
+            raise InputError(f"sensor: saturation must be a positive field in T, got {self.saturation!r}")
+        for name, shape in (("gain", (3, 3)), ("offset", (3,))):
+            value = np.asarray(getattr(self, name), dtype=float)
+            if value.shape != shape or not np.isfinite(value).all():
+                raise InputError(f"sensor: {name} must be {shape} finite numbers")
+            object.__setattr__(self, name, value)
+        if abs(np.linalg.det(np.asarray(self.gain))) < 1e-6:
+            raise InputError("sensor: gain cannot be undone: its axes must not lie in a plane")
+
+    def readings(self, B: Vectors) -> Vectors:
+        """What the sensor reads, without noise and rounding, of fields B (..., 3) T in its own frame."""
+        return np.asarray(B @ np.asarray(self.gain).T + self.offset)
+
+
+Sensors: TypeAlias = Sensor | RigidTransform | Sequence[Sensor | RigidTransform] | None
+"""One sensor or several; a pose stands for a sensor of which nothing else is known, None for one at the origin."""
+
+
+@dataclass(frozen=True, eq=False)
+class SensorArray:
+    """Sensors as arrays: positions (s, 3) m and axes (s, 3, 3), their columns in the common frame."""
+
+    sensors: tuple[Sensor, ...]
+    positions: Floats
+    axes: Floats
+
+    @property
+    def gains(self) -> Floats:
+        """(s, 3, 3)."""
+        return np.array([one.gain for one in self.sensors])
+
+
+def as_sensors(sensors: Sensors) -> SensorArray:
+    """Sensors as arrays. Raises InputError for what are none."""
+    if sensors is None:
+        sensors = Sensor()
+    if isinstance(sensors, RigidTransform) and not sensors.single:
+        sensors = list(sensors)
+    several = [sensors] if isinstance(sensors, Sensor | RigidTransform) else list(sensors)
+    found = tuple(Sensor(pose=one) if isinstance(one, RigidTransform) else one for one in several)
+    if not found or not all(isinstance(one, Sensor) for one in found):
+        raise InputError("sensors must be a Sensor, a RigidTransform, or a sequence of these")
+    return SensorArray(
+        found,
+        np.array([one.pose.translation for one in found]),
+        np.array([one.pose.rotation.as_matrix() for one in found]),
+    )
+
+
+def is_one(sensors: Sensors) -> bool:
+    """Whether `sensors` stands for one sensor, whose samples have no axis of sensors."""
+    return sensors is None or isinstance(sensors, Sensor) or (isinstance(sensors, RigidTransform) and sensors.single)
