@@ -38,13 +38,17 @@ class RecordingColumns:
         times = self.t.in_si(cells[:, 3]) if self.t else None
         return times, B, None if self.sensor is None else table.words(self.sensor)
 
-    def line(self, number: int, text: str) -> tuple[float | None, tuple[float, float, float], str] | None:
-        """Time (s), B (T) and sensor of a single line; None for a blank one. Raises InputError that names the line."""
+    def line(self, number: int, text: str) -> tuple[float | None, tuple[float, float, float], str]:
+        """Time (s), B (T) and sensor of a single line that is not blank. Raises InputError that names the line."""
         times, B, sensors = self.readings(replace(self.table, lines=(text,), first_line=number))
         if not len(B):
-            return None
+            raise InputError(f"expected {len(self.table.header)} cells, got none [{self.table.path}: line {number}]")
         x, y, z = B[0].tolist()
         return None if times is None else float(times[0]), (x, y, z), "" if sensors is None else sensors[0]
+
+    def separated_as(self, line: str) -> RecordingColumns:
+        """The same columns, of rows whose cells are separated as in this one."""
+        return replace(self, table=replace(self.table, delimiter=delimiter_of(line) or ","))
 
 
 def recording_columns(
@@ -99,7 +103,7 @@ def read_recording(
         found = recording_columns(table, columns, rate)
     else:
         found = stated_columns(header, columns, rate)
-        table = _headless(path, text, found.table.header)
+        table = _headless(path, text, found)
     times, B, names = found.readings(table)
     if not len(B):
         raise InputError(f"there are no samples in it [{path}]")
@@ -134,12 +138,12 @@ def check_rate(recording: Recording, rate: float, source: str) -> None:
         )
 
 
-def _headless(path: Path, text: str, header: tuple[str, ...]) -> Table:
+def _headless(path: Path, text: str, columns: RecordingColumns) -> Table:
     """The table of a file that begins with its first row."""
     lines = text.split("\n")
     start = next((k for k, line in enumerate(lines) if line.strip() and not is_comment(line)), len(lines))
-    first = lines[start] if start < len(lines) else ""
-    return Table(path, header, 1, lines[start:], start + 1, delimiter_of(first) or ",")
+    table = columns.separated_as(lines[start] if start < len(lines) else "").table
+    return replace(table, path=path, lines=lines[start:], first_line=start + 1)
 
 
 def _sensor_column(table: Table, mapped: str | None) -> int | None:

@@ -114,11 +114,11 @@ def test_mappings_of_recordings_are_their_own() -> None:
 def test_lines_one_by_one_are_read_as_files_are() -> None:
     columns = stated_columns("t_ms,bx_uT,by_uT,bz_uT,sensor")
     found = columns.line(7, "1500,1,,3,left\r\n")
-    assert found is not None
     assert found[0] == 1.5 and found[2] == "left"
     assert np.array_equal(found[1], [1 / 1e6, NAN, 3 / 1e6], equal_nan=True)
-    assert columns.line(8, " \n") is None
-    for text, message in (("1500,1,2,left", "got 4"), ("1500,1,2,x,left", 'got "x"'), ('"1', "not valid CSV")):
+    assert columns.separated_as("1;2").line(8, "1500;1;2;3;left")[1][1] == 2 / 1e6
+    faults = ("1500,1,2,left", "got 4"), ("1500,1,2,x,left", 'got "x"'), ('"1', "not valid CSV"), (" ", "got none")
+    for text, message in faults:
         with pytest.raises(InputError, match=message) as caught:
             columns.line(9, text)
         assert "line 9" in str(caught.value)
