@@ -212,8 +212,8 @@ def pose_line(entry: dict[str, Any]) -> str:
     x, y, z = (f"{1e3 * value:.2f}" for value in entry["position"])
     axis = ", ".join(f"{value:.3f}" for value in entry["axis"])
     text = (
-        f"t = {entry['time']:.6g} s: position ({x}, {y}, {z}) mm {_deviation(entry['position_deviation'], 'length')}, "
-        f"axis ({axis}) {_deviation(entry['axis_deviation'], 'angle')}, {entry['frequency']:.6g} Hz"
+        f"t = {entry['time']:.6g} s: position ({x}, {y}, {z}) mm ± {_millimetres(entry['position_deviation'])} mm, "
+        f"axis ({axis}) ± {_degrees(entry['axis_deviation'])} deg, {entry['frequency']:.6g} Hz"
     )
     others = len(entry["branches"]) - 1
     return f"{text}, one of {others + 1} branches" if entry["ambiguous"] and others else text
@@ -227,13 +227,15 @@ def _text(data: dict[str, Any], setup: Setup, recording: Recording, files: Seque
         ("moment", f"{format_quantity(setup.rotor.moment, 'moment')} across the axis"),
         ("seen from", "the sensor" if list(setup.sensors) == [""] else "the frame of the sensors' card"),
     ]
-    poses = [("time", "frequency", "x (mm)", "y", "z", "±", "axis", "±", "phase", "field", "SNR")]
+    poses: list[tuple[str, ...]] = [
+        ("time", "frequency", "x (mm)", "y", "z", "±", "axis", "± (deg)", "phase", "field", "SNR")
+    ]
     poses += [_row(entry) for entry in entries[:_MOST_ROWS]]
     text = f"{data['model']} turns\n{listing(rows)}\n\n{table(poses)}"
     if len(entries) > _MOST_ROWS:
         text += f"\n  and {len(entries) - _MOST_ROWS} more"
     if len(entries) == 1 and len(entries[0]["branches"]) > 1:
-        branches = [("branches", "x (mm)", "y", "z", "axis", "phase", "log likelihood less")]
+        branches: list[tuple[str, ...]] = [("branches", "x (mm)", "y", "z", "axis", "phase", "log likelihood less")]
         best = entries[0]["log_likelihood"]
         for number, one in enumerate(entries[0]["branches"], 1):
             less = "" if one["log_likelihood"] is None else f"{max(best - one['log_likelihood'], 0.0):.1f}"
@@ -252,9 +254,9 @@ def _row(entry: dict[str, Any]) -> tuple[str, ...]:
         f"{entry['time']:.6g} s",
         f"{entry['frequency']:.6g} Hz",
         *_position_cells(entry),
-        _deviation(entry["position_deviation"], "length").removeprefix("± "),
+        _millimetres(entry["position_deviation"]),
         _axis_cell(entry),
-        _deviation(entry["axis_deviation"], "angle").removeprefix("± "),
+        _degrees(entry["axis_deviation"]),
         _phase_cell(entry),
         format_quantity(float(f"{entry['strength']:.3g}"), "flux density"),
         "" if snr is None else f"{snr:.1f} dB",
@@ -274,8 +276,13 @@ def _phase_cell(one: dict[str, Any]) -> str:
     return f"{math.degrees(one['phase']):.2f} deg"
 
 
-def _deviation(value: float | None, dimension: str) -> str:
-    return "± ?" if value is None else f"± {format_quantity(float(f'{value:.2g}'), dimension)}"
+def _millimetres(deviation: float | None) -> str:
+    return "?" if deviation is None else f"{1e3 * deviation:.2g}"
+
+
+def _degrees(deviation: float | None) -> str:
+    """An axis that may as well point anywhere has no deviation."""
+    return "?" if deviation is None or deviation > math.pi / 2 else f"{math.degrees(deviation):.2g}"
 
 
 def _rate(recording: Recording) -> str:
