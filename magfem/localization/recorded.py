@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from magfem.errors import InputError
+from magfem.errors import ConvergenceError, InputError
 from magfem.localization.frequency import find_frequency, spectrum
 from magfem.localization.localize import localize, localize_several, locate_field
 from magfem.localization.pose import Pose
@@ -78,13 +78,20 @@ def localize_recording(
         raise InputError(f"all {len(recording.times)} samples are missing")
     prior = [None] * setup.motors if near is None else list(near)
     if len(setup.frequencies) > 1:
-        found = localize_several(samples, times, setup.rotor, setup.frequencies, sensors, near=prior)
-        return found, names
+        several = localize_several(samples, times, setup.rotor, setup.frequencies, sensors, near=prior, strict=False)
+        return tuple(_converged(pose) for pose in several), names
     frequency = setup.frequencies[0] if setup.frequencies else None
     if frequency is None and not _together(samples):
-        return (_of_separate_times(samples, times, setup, sensors, prior[0]),), names
-    pose = localize(samples, times, setup.rotor, frequency, sensors, near=prior[0], drift=setup.drift)
-    return (pose,), names
+        return (_converged(_of_separate_times(samples, times, setup, sensors, prior[0])),), names
+    pose = localize(samples, times, setup.rotor, frequency, sensors, near=prior[0], drift=setup.drift, strict=False)
+    return (_converged(pose),), names
+
+
+def _converged(pose: Pose) -> Pose:
+    """The pose; ConvergenceError where the branch chosen did not converge. That others did not is no harm."""
+    if not pose.converged:
+        raise ConvergenceError(f"the refinement did not converge in {int(pose.iterations)} steps")
+    return pose
 
 
 def _together(samples: Floats) -> bool:
@@ -107,4 +114,4 @@ def _of_separate_times(
         demodulate(one, times, turning, noise=s.noise, resolution=s.resolution, saturation=s.saturation)
         for one, s in zip(samples, sensors, strict=True)
     ]
-    return locate_field(fields, setup.rotor, sensors, near=near)
+    return locate_field(fields, setup.rotor, sensors, near=near, strict=False)

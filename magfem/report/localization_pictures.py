@@ -53,7 +53,8 @@ def localization_picture(
     last = own.subset((own.times >= window[0]) & (own.times <= window[1]))
     with drawing():
         drawn = figure(5.2, _WIDE)
-        left, right = drawn.subfigures(1, 2, width_ratios=(1.0, 1.0))
+        halves: Any = drawn.subfigures(1, 2)
+        left, right = halves
         *signal, below = left.subplots(4, height_ratios=(1, 1, 1, 1.6))
         _signal(signal, last, poses, entries[-1]["sensors"].index(name))
         _spectrum(below, last, poses, setup)
@@ -129,10 +130,12 @@ def _space(drawn: SubFigure, panel: Axes, setup: Setup, entries: Sequence[dict[s
     shown = np.concatenate([places, [one.pose.translation for one in setup.sensors.values()]])
     corners, floor = _floor(shown)
     shared = view(1.0)
-    flat = View(shared.right, shared.up, shared.towards, 1.0).project(np.concatenate([shown, corners]))
+    bare = View(shared.right, shared.up, shared.towards, 1.0)
+    size = 0.15 * float(np.ptp(bare.project(np.concatenate([shown, corners])), axis=0).max())
+    tips = places + size * np.array([entry["axis"] for entry in entries])
+    flat = bare.project(np.concatenate([shown, corners, tips]))
     low, high = flat.min(axis=0), flat.max(axis=0)
-    half = 0.62 * float((high - low).max())
-    size = 0.3 * half
+    half = 0.6 * float((high - low).max())
     middle = (low + high) / 2
     seen = View(shared.right, shared.up, shared.towards, half, middle[0] * shared.right + middle[1] * shared.up)
     limit = half * MILLI
@@ -161,9 +164,11 @@ def _space(drawn: SubFigure, panel: Axes, setup: Setup, entries: Sequence[dict[s
     axes_cross(panel, seen)
     scale_bar(panel, seen)
     handles = [Line2D([], [], color=PURPLE, marker="o", markersize=4, label="magnet, its axis")]
-    handles.append(Line2D([], [], color=INK, marker="s", markersize=4, linestyle="none", label="sensor"))
-    handles += [Line2D([], [], color=colour, label=f"its {axis}") for axis, colour in zip("xyz", AXES, strict=True)]
-    drawn.legend(handles=handles, loc="outside lower center", ncols=5, handlelength=1.0, columnspacing=1.0)
+    first = Line2D([], [], color=AXES[0], marker="s", markersize=4, markerfacecolor=INK, markeredgecolor=INK)
+    handles += [first, *(Line2D([], [], color=colour) for colour in AXES[1:])]
+    for handle, label in zip(handles[1:], ("sensor, its x", "y", "z"), strict=True):
+        handle.set_label(label)
+    drawn.legend(handles=handles, loc="outside lower center", ncols=4, handlelength=1.0, columnspacing=1.0)
 
 
 def _floor(shown: Points) -> tuple[Points, list[Points]]:
