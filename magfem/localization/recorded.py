@@ -18,6 +18,8 @@ from magfem.samples.recording import Recording
 from magfem.typing import ArrayLike, Floats
 from magfem.units import quoted
 
+FEWEST = 4  # times of samples, one more than the unknowns of an axis
+
 _ALL = 0.9  # share of the times at which a sensor must have read for its samples to be taken together with others'
 
 
@@ -76,6 +78,9 @@ def localize_recording(
     sensors = [setup.sensor(name) for name in names]
     if not names:
         raise InputError(f"all {len(recording.times)} samples are missing")
+    if len(times) < FEWEST:
+        few = f"{len(times)} samples do" if len(times) > 1 else "1 sample does"
+        raise InputError(f"{few} not determine the static field, cosine and sine: {FEWEST} times are the least")
     prior = [None] * setup.motors if near is None else list(near)
     if len(setup.frequencies) > 1:
         several = localize_several(samples, times, setup.rotor, setup.frequencies, sensors, near=prior, strict=False)

@@ -16,6 +16,7 @@ TRUE = Turning([0.02, 0.005, 0.03], [0.3, -0.2, 1.0])
 T = np.arange(600) / 20.0
 NOISE = 0.3e-6
 FILE = ["localize", "--model", "dipole.json", "--samples", "s.csv"]
+KNOWN = ["--noise", "0.3 uT"]  # without any noise, rounding decides between branches that are equal
 
 
 @pytest.fixture
@@ -46,7 +47,7 @@ def angle(a: Any, b: Any) -> float:
 
 @pytest.mark.parametrize("frequency", [["--frequency", "0.5"], ["--frequency", "500 mHz"], []])
 def test_the_pose_of_the_formula(frequency: list[str], here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    data = found(capsys, *FILE, "-o", "poses.json", *frequency)
+    data = found(capsys, *FILE, *KNOWN, "-o", "poses.json", *frequency)
     assert json.loads(Path("poses.json").read_text()) == data
     assert (data["format"], data["version"], data["samples"]) == ("magfem-poses", 1, "s.csv")
     (pose,) = data["poses"]
@@ -85,15 +86,16 @@ def test_windows_follow_a_magnet_that_moves(here: Path, capsys: pytest.CaptureFi
     """It crosses the sensor's own plane, where branches without a prior change over; a gap leaves windows out."""
     steps = [Turning([0.02, 0.01, z], [1.0, 0.2, 0.5]) for z in np.linspace(0.014, -0.014, 15)]
     B = np.concatenate([one.field([0, 0, 0], T[40 * k : 40 * k + 40]) for k, one in enumerate(steps)])
-    keep = (T < 12) | (T >= 15.5)
+    keep = (T < 12) | (T >= 15.8)
     write_samples(Path("s.csv"), T[keep], noisy(B)[keep])
     words = ["--window", "2", "--frequency", "0.5", "--near", "20 10 14 mm"]
     data = found(capsys, *FILE, *words)
     assert [pose["time"] for pose in data["poses"]] == pytest.approx([*range(1, 13, 2), *range(17, 31, 2)])
-    assert len(data["left_out"]) == 1 and data["left_out"][0]["time"] == pytest.approx(15.0)  # half a second of it
+    assert len(data["left_out"]) == 1 and data["left_out"][0]["time"] == pytest.approx(15.0)  # four samples of it
     for pose in data["poses"]:
         one = steps[round((pose["time"] - 1) / 2)]
-        assert pose["position"] == pytest.approx(one.position, abs=0.5e-3)
+        off = np.linalg.norm(np.subtract(pose["position"], one.position))
+        assert off < 3 * pose["position_deviation"] < 5e-3
         assert pose["window"] == pytest.approx([pose["time"] - 1, pose["time"] + 1])
     assert len(found(capsys, *FILE, *words, "--step", "500 ms")["poses"]) > 40
 
@@ -195,20 +197,23 @@ def test_several_motors_have_a_pose_each(here: Path, capsys: pytest.CaptureFixtu
 def test_the_rotation_axis_in_the_models_frame(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The dipole lies along x of its model: about y or z it turns alike, about x not at all."""
     for axis in ("y", "z", "0, 1, -1"):
-        (pose,) = found(capsys, *FILE, "--rotation-axis", axis)["poses"]
+        (pose,) = found(capsys, *FILE, *KNOWN, "--rotation-axis", axis)["poses"]
         assert pose["position"] == pytest.approx(TRUE.position, abs=1e-8)
     assert main([*FILE, "--rotation-axis", "x"]) == 2
     assert "moment lies along the rotation axis" in capsys.readouterr().err
 
 
-def test_a_frequency_that_drifts(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """0.5 Hz at time zero, 2 mHz/s more: three quarters of a turn over the recording."""
-    slowed = T + 0.5 * 2e-3 / 0.5 * T**2  # the time at which the steady one has turned as far
-    write_samples(Path("s.csv"), T, TRUE.field([0, 0, 0], slowed) + EARTH)
-    (pose,) = found(capsys, *FILE, "--drift", "--frequency", "0.5")["poses"]
-    assert pose["drift"] == pytest.approx(2e-3, rel=1e-6)
+@pytest.mark.parametrize("stated", [[], ["--frequency", "0.51"]])
+def test_a_frequency_that_drifts(stated: list[str], here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """0.5 Hz at time zero, 1 mHz/s more: almost half a turn over the recording."""
+    later = T + 0.5 * 1e-3 / 0.5 * T**2  # the time at which the steady one has turned as far
+    write_samples(Path("s.csv"), T, TRUE.field([0, 0, 0], later) + EARTH)
+    (pose,) = found(capsys, *FILE, *KNOWN, "--drift", *stated)["poses"]
+    assert pose["drift"] == pytest.approx(1e-3, rel=1e-6) and pose["frequency"] == pytest.approx(0.5, abs=1e-8)
     assert pose["position"] == pytest.approx(TRUE.position, abs=1e-8)
     assert pose["phase"] == pytest.approx(TRUE.phase, abs=1e-6)
+    (steady,) = found(capsys, *FILE, *KNOWN)["poses"]
+    assert np.linalg.norm(np.subtract(steady["position"], TRUE.position)) > 1e-4
 
 
 def test_saturated_readings_are_not_believed(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -223,7 +228,7 @@ def test_saturated_readings_are_not_believed(here: Path, capsys: pytest.CaptureF
 
 
 def test_text_for_people(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main([*FILE, "-q", "-o", "p.json"]) == 0
+    assert main([*FILE, *KNOWN, "-q", "-o", "p.json"]) == 0
     text = capsys.readouterr().out
     for words in ("600 of 1 sensor, 20 Hz", "2.6 mA·m² across the axis", "20.000  5.000  30.000", "branches", "p.json"):
         assert words in text
@@ -253,10 +258,11 @@ def test_a_picture(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
         ("--frequency 10", "10 Hz is not below half the rate of the samples (20 Hz)"),
         ("--frequency 12.5", "12.5 Hz is not below half the rate"),
         ("--frequency 0.5 --frequency 0.5", "given twice"),
-        ("--frequency 0.5 --frequency 0.505", "cannot tell the frequencies 0.5, 0.505 Hz from each other"),
+        ("--frequency 0.5 --frequency 0.501", "cannot tell the frequencies 0.5, 0.501 Hz from each other"),
         ("--frequency 0.5 --frequency 1 --drift", "--drift is for a single motor"),
         ("--near '20 5 30'", "--near"),
-        ("--near '20 5 mm'", "--near must be three lengths"),
+        ("--near '20 5 mm'", "--near"),
+        ("--near '20 mm'", "--near must be three lengths"),
         ("--near '20 5 30 mT'", "which is not a length"),
         ("--near '1 2 3 mm' --near '1 2 3 mm'", "--near is given 2 times, and there are 1 motors"),
         ("--rotation-axis up", "--rotation-axis must be x, y, z or three numbers"),
@@ -297,8 +303,8 @@ def test_faults_in_one_line(words: str, fragment: str, here: Path, capsys: pytes
     [
         ("t,by,bz\n0,1,2\n", "", "column bx is missing"),
         ("t,bx,by,bz\n0,1,1,1\n0,1,1,1\n", "", "t must increase, got 0 s after 0 s [s.csv: line 3]"),
-        ("t,bx,by,bz\n0,1,1,1\n1,1,1,1\n2,1,1,1\n", "--frequency 0.2", "3 usable samples"),
-        ("t,bx,by,bz\n0,1,1,1\n", "", "samples at different times"),
+        ("t,bx,by,bz\n0,1,1,1\n1,1,1,1\n2,1,1,1\n", "--frequency 0.2", "3 samples do not determine"),
+        ("t,bx,by,bz\n0,1,1,1\n", "", "1 sample does not determine"),
         ("t,bx,by,bz\n0,,,\n1,,,\n", "", "all 2 samples are missing"),
         ("t,bx,by,bz,sensor\n0,1,1,1,a\n1,1,1,1,b\n", "", 'of a sensor "a": where it stands must be stated'),
         ("t,bx,by,bz,sensor\n0,1,1,1,a\n", "--sensors pair.toml", 'there is no sensor "a": known are "left", "right"'),
