@@ -1,4 +1,4 @@
-"""The picture of a localization: what it says holds what was found; it draws for one motor and one sensor as for more."""
+"""The picture of a localization: drawn for one motor and one sensor as for more, with what was found in it."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ ROTOR = as_rotor(DipoleField([2.6e-3, 0, 0]))
 
 
 def drawn(motors: int, sensors: int, drift: bool = False) -> Picture:
-    names = ("", "a", "b")[:1] if sensors == 1 else ("a", "b")
+    names = ("",) if sensors == 1 else ("a", "b")
     array = {name: Sensor(pose=RigidTransform.from_translation([0.02 * k, 0, 0])) for k, name in enumerate(names)}
     frequencies = (0.5, 1.3)[:motors]
     seen = sum(
@@ -43,7 +43,7 @@ def drawn(motors: int, sensors: int, drift: bool = False) -> Picture:
 def test_it_draws(motors: int, sensors: int, drift: bool) -> None:
     picture = drawn(motors, sensors, drift)
     image = pyplot.imread(io.BytesIO(picture.png))[..., :3]
-    assert picture.size == (1480, 1040) and "poses" in picture.alt or motors == 1
+    assert picture.size == (1480, 1040) and ("2 poses" in picture.alt) == (motors == 2)
     colour = np.array([int(PURPLE[k : k + 2], 16) / 255 for k in (1, 3, 5)])
     purple = np.abs(image - colour).max(axis=-1) < 0.02
     width = purple.shape[1]
