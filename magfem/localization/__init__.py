@@ -3,21 +3,25 @@
 from magfem.localization.dipole_pose import DipolePoses, dipole_poses
 from magfem.localization.frequency import Frequency, Spectrum, find_frequency, spectrum
 from magfem.localization.localize import localize, localize_several, locate_field
+from magfem.localization.motion import ProcessNoise
 from magfem.localization.pose import Branch, Pose
 from magfem.localization.rotor import Rotor, as_rotor
 from magfem.localization.sensor import Sensor
 from magfem.localization.signal import RotatingField, demodulate, demodulate_several
 from magfem.localization.simulated import simulated_samples
+from magfem.localization.tracking import Track, track, windows
 
 __all__ = [
     "Branch",
     "DipolePoses",
     "Frequency",
     "Pose",
+    "ProcessNoise",
     "RotatingField",
     "Rotor",
     "Sensor",
     "Spectrum",
+    "Track",
     "as_rotor",
     "demodulate",
     "demodulate_several",
@@ -28,4 +32,6 @@ __all__ = [
     "locate_field",
     "simulated_samples",
     "spectrum",
+    "track",
+    "windows",
 ]

@@ -174,20 +174,21 @@ def _demodulated(
 def _located(
     fields: tuple[RotatingField, ...], rotor: Rotor, array: SensorArray, near: ArrayLike | Pose | None, strict: bool
 ) -> Pose:
-    measured = _measured(fields, array)
+    measured = whitened(fields, array)
     position, frame, clamped = _starts(measured, rotor, array)
     repeated = Measured(measured.quadratures[..., None, :, :], measured.whitening[..., None, :, :, :])
     refined = refine(rotor, array, repeated, position, frame)
-    if strict and not refined.converged.all(axis=-1).all():
-        worst = int(np.count_nonzero(~refined.converged))
+    pose = _pose(fields, rotor, array, measured, refined, clamped, near)
+    if strict and not pose.converged.all():
         raise ConvergenceError(
-            f"{worst} of {refined.converged.size} refinements did not converge in {int(refined.iterations.max())} "
-            "steps; pass strict=False to see them all the same"
+            f"{np.count_nonzero(~pose.converged)} of {pose.converged.size} poses did not converge in "
+            f"{int(pose.iterations.max())} steps, residual {float(pose.residual[~pose.converged].max()):.3g} deviations; "
+            "pass strict=False to see them all the same"
         )
-    return _pose(fields, rotor, array, measured, refined, clamped, near)
+    return pose
 
 
-def _measured(fields: Sequence[RotatingField], array: SensorArray) -> Measured:
+def whitened(fields: Sequence[RotatingField], array: SensorArray) -> Measured:
     """Quadratures and whitening of all sensors, their gains undone."""
     undo = np.linalg.inv(array.gains)
     both = np.zeros((len(undo), 6, 6))

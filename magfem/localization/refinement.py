@@ -22,9 +22,15 @@ from magfem.localization.rotor import Rotor
 from magfem.localization.sensor import SensorArray
 from magfem.typing import Booleans, Floats, Integers, Points
 
-MOST_ITERATIONS = 60
+MOST_ITERATIONS = 200
 SMALL_STEP = 1e-11  # of the distance, and rad
-FLAT = 1e-14  # relative gain of a step below which a minimum is as flat as rounding
+NEGLIGIBLE = 1e-8
+"""Gain of a step in the misfit that no noise would notice. Where the misfit is small this last step left an error that
+is the square of a negligible one: Gauss–Newton converges quadratically there."""
+
+PATIENCE = 50  # steps after which a thousand times that gain counts as none: valleys of wrong branches are long
+LIGHT = 1e-3  # damping below which a step with little gain tells of a minimum, not of the damping
+FIRST_DAMPING = 1e-4  # of the mean of the normal matrix' diagonal
 LONGEST_STEP = 0.3  # of the distance, and rad
 CLOSEST = 1e-3  # of the first distance: nothing comes nearer to a sensor
 
@@ -69,9 +75,9 @@ def refine(rotor: Rotor, array: SensorArray, measured: Measured, position: Point
     scale = np.linalg.norm(p[:, None, :] - array.positions, axis=-1).min(axis=-1)
     least = CLOSEST * scale
 
-    J, residual = _linearised(rotor, array, p, R, target, weight)
+    J, residual = linearised(rotor, array, p, R, target, weight)
     misfit = np.einsum("ni,ni->n", residual, residual)
-    damping = np.full(count, 1e-6)
+    damping, growth = np.full(count, FIRST_DAMPING), np.full(count, 2.0)
     converged, iterations = np.zeros(count, dtype=bool), np.zeros(count, dtype=np.int64)
     active = np.arange(count)
     for _ in range(MOST_ITERATIONS):
@@ -88,19 +94,25 @@ def refine(rotor: Rotor, array: SensorArray, measured: Measured, position: Point
         step *= np.minimum(1.0, LONGEST_STEP / np.maximum(length, 1e-300))[:, None]
         tried_p = p[active] + scale[active, None] * np.einsum("nij,nj->ni", R[active], step[:, :3])
         tried_R = R[active] @ rotation_matrix(step[:, 3:])
-        tried_J, tried_residual = _linearised(rotor, array, tried_p, tried_R, target[active], weight[active])
+        tried_J, tried_residual = linearised(rotor, array, tried_p, tried_R, target[active], weight[active])
         tried = np.einsum("ni,ni->n", tried_residual, tried_residual)
         near = np.linalg.norm(tried_p[:, None, :] - array.positions, axis=-1).min(axis=-1)
         better = (tried <= misfit[active]) & (near > least[active])
         gain = misfit[active] - tried
         small = length < SMALL_STEP
-        flat = better & (gain <= FLAT * tried) & (length < 1e-4)
+        little = np.where(iterations[active] < PATIENCE, NEGLIGIBLE, 1e3 * NEGLIGIBLE)
+        flat = better & (gain < np.maximum(little, 1e-14 * tried)) & (damping[active] <= LIGHT)
         stuck = ~better & (damping[active] > 1e8)
         done = small | flat | stuck
         taken = active[better]
         p[taken], R[taken], misfit[taken] = tried_p[better], tried_R[better], tried[better]
         J[better], residual[better] = tried_J[better], tried_residual[better]
-        damping[active] = np.where(better, np.maximum(0.1 * damping[active], 1e-15), 10 * damping[active])
+        # Nielsen's rule: less damping the better the linear prediction was, and ever more when steps fail.
+        predicted = -np.einsum("ni,ni->n", step, 2 * gradient + np.einsum("nij,nj->ni", normal, step))
+        ratio = np.clip(gain / np.maximum(predicted, 1e-300), -1.0, 1.0)
+        less = damping[active] * np.maximum(0.1, 1 - (2 * ratio - 1) ** 3)
+        damping[active] = np.where(better, np.maximum(less, 1e-15), growth[active] * damping[active])
+        growth[active] = np.where(better, 2.0, 2 * growth[active])
         iterations[active] += 1
         converged[active[done & ~stuck]] = True
         # Rejected small steps end at a minimum as well: rounding is all that is left.
@@ -111,7 +123,7 @@ def refine(rotor: Rotor, array: SensorArray, measured: Measured, position: Point
         active, J, residual = active[keep], J[keep], residual[keep]
     U, _, V = np.linalg.svd(R)
     R = U @ V  # many small turns leave a matrix that is a rotation to a few roundings
-    J, _ = _linearised(rotor, array, p, R, target, weight)
+    J, _ = linearised(rotor, array, p, R, target, weight)
     J[..., :3] = np.einsum("nkj,nij->nki", J[..., :3], R)  # from the rotor's frame to the common one
     return Refined(
         position=p.reshape(*lead, 3),
@@ -141,7 +153,7 @@ def information(rotor: Rotor, array: SensorArray, position: Points, frame: Float
     return found
 
 
-def _linearised(
+def linearised(
     rotor: Rotor, array: SensorArray, p: Points, R: Floats, target: Floats, weight: Floats
 ) -> tuple[Floats, Floats]:
     """Whitened J (n, 6s, 6) and residuals (n, 6s) of poses (n, 3), (n, 3, 3)."""

@@ -210,6 +210,10 @@ def _fit(
     # Samples without any noise: what rounding of numbers leaves keeps weights finite.
     least = 1e-15 * np.abs(b).max(axis=(-2, -1))[..., None]
     noise = np.maximum(residual if sigma is None else np.broadcast_to(sigma, residual.shape), least)
+    if sigma is None:
+        # The coefficients' posterior is Student's t with ν = n − k degrees of freedom, its covariance ν/(ν − 2) larger.
+        freedom = (count - k).astype(float)
+        inverse = inverse * (freedom / np.maximum(freedom - 2, 1.0))[..., None, None]
     return _Fitted(coefficients, inverse, noise, residual, count, saturated)
 
 

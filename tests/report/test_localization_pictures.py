@@ -1,53 +1,34 @@
-"""The picture of a localization: drawn for one motor and one sensor as for more, with what was found in it."""
+"""Pictures of isoline functions and of the stator's influence: what is drawn, and that the same is drawn twice."""
 
 from __future__ import annotations
 
-import io
+import re
 
 import numpy as np
 import pytest
-from matplotlib import pyplot
-from scipy.spatial.transform import RigidTransform
 
-from magfem.fields.dipole_field import DipoleField
-from magfem.localization import Sensor, as_rotor, simulated_samples
-from magfem.localization.poses_file import pose_to_dict
-from magfem.localization.recorded import Setup, localize_recording
-from magfem.report.figures.style import PURPLE, Picture
-from magfem.report.localization_pictures import localization_picture
-from magfem.samples.recording import Recording
-
-T = np.arange(200) / 20.0
-ROTOR = as_rotor(DipoleField([2.6e-3, 0, 0]))
+from magfem.localization.isoline_curves import curves
+from magfem.localization.stator_influence import stator_influence
+from magfem.report.isoline_pictures import draw as draw_isolines
+from magfem.report.stator_pictures import draw as draw_stator
 
 
-def drawn(motors: int, sensors: int, drift: bool = False) -> Picture:
-    names = ("",) if sensors == 1 else ("a", "b")
-    array = {name: Sensor(pose=RigidTransform.from_translation([0.02 * k, 0, 0])) for k, name in enumerate(names)}
-    frequencies = (0.5, 1.3)[:motors]
-    seen = sum(
-        simulated_samples(ROTOR, [0.01, 0.01 * k, 0.02], [0.3, 0.1, 1], T, f, list(array.values()))
-        for k, f in enumerate(frequencies)
-    )
-    assert isinstance(seen, np.ndarray)
-    recording = Recording(
-        np.tile(T, len(names)), seen.reshape(-1, 3), np.repeat(np.arange(len(names)), len(T)), names, "made"
-    )
-    setup = Setup(ROTOR, () if drift else frequencies, array, drift)
-    poses, took_part = localize_recording(recording, setup)
-    entries = [pose_to_dict(pose, 5.0, (0.0, 10.0), took_part) for pose in poses]
-    return localization_picture(recording, setup, entries, poses)
+@pytest.mark.parametrize("parametrisation", ["eccentric", "polar"])
+def test_isolines(parametrisation):
+    found = curves("rotor_1x3", parametrisation)
+    pictures = draw_isolines(found)
+    assert [picture.name for picture in pictures] == ["isoline_positions", "isoline_angles", "isoline_sensitivity"]
+    stated = float(re.search(r"up to ([\d.]+) %", pictures[0].caption)[1])
+    assert stated == pytest.approx(100 * np.abs(found.distance / found.field_distance - 1).max(), abs=0.06)
+    assert [picture.png for picture in draw_isolines(found)] == [picture.png for picture in pictures]
+    for picture in pictures:
+        assert picture.size[0] == 1480 and picture.alt and picture.caption
 
 
-@pytest.mark.parametrize(("motors", "sensors", "drift"), [(1, 1, False), (2, 2, False), (1, 2, True)])
-def test_it_draws(motors: int, sensors: int, drift: bool) -> None:
-    picture = drawn(motors, sensors, drift)
-    image = pyplot.imread(io.BytesIO(picture.png))[..., :3]
-    assert picture.size == (1480, 1040) and ("2 poses" in picture.alt) == (motors == 2)
-    colour = np.array([int(PURPLE[k : k + 2], 16) / 255 for k in (1, 3, 5)])
-    purple = np.abs(image - colour).max(axis=-1) < 0.02
-    width = purple.shape[1]
-    assert purple[:, : width // 2].sum() > 200  # the frequency in the spectrum
-    assert purple[:, width // 2 :].sum() > 200 * motors  # the magnets with their axes
-    names = ("", " of sensor a", " of sensor b")
-    assert any(f"The signal{name} with its fit" in picture.alt for name in names)
+def test_stator():
+    found = stator_influence(distances=np.array([5e-3, 10e-3, 40e-3]))
+    pictures = draw_stator(found)
+    assert [picture.name for picture in pictures] == ["stator_field", "stator_bias"]
+    low, high = map(float, re.search(r"ratio, (\d+) to (\d+)", pictures[0].caption).groups())
+    assert (low, high) == pytest.approx((found.fields.ratio.min(), found.fields.ratio.max()), abs=0.5)
+    assert [picture.png for picture in draw_stator(found)] == [picture.png for picture in pictures]

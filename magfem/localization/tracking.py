@@ -1,0 +1,347 @@
+"""Tracks: poses of a magnet that moves, each from a short window of samples, and all of them together.
+
+A pose from one window alone may take a wrong branch, and a filter that starts from it passes the fault on. Here all
+windows are judged at once: every window offers its branches, the path through them that moves least for what the
+samples allow is where Gauss–Newton begins, and the track is the one that explains all samples best while it moves as
+smoothly as its process noise says. That is found from the samples as well, as what makes them most likely. Windows
+that do not fit the track even so are told from it, and weigh less.
+
+The magnet is taken to stand still during a window. One sensor alone cannot tell a track from its mirror image: then
+`Track.ambiguous` says so, and `near` chooses.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2
+
+from magfem.errors import ConvergenceError, InputError
+from magfem.localization.localize import Model, Sensors, localize, whitened
+from magfem.localization.motion import Likelihoods, ProcessNoise, Smoothed, kalman_filter, smooth
+from magfem.localization.orientation import orientation, rotation_matrix
+from magfem.localization.pose import Pose
+from magfem.localization.refinement import Measured, linearised
+from magfem.localization.rotor import Rotor, as_rotor
+from magfem.localization.sensor import SensorArray, as_sensors
+from magfem.threads import one_thread_for_algebra
+from magfem.typing import ArrayLike, Booleans, Floats, Points, Vectors
+
+MOST_ITERATIONS = 40
+SMALL_CHANGE = 1e-6  # of the distance, and rad
+LONGEST_TURN = 0.3  # rad an iteration may turn an axis by, and of the distance that it may move a position by
+FAULTY = 1e-4  # probability of a window's misfit below which it is told from the track
+UNIT_LENGTH = 0.3
+ALTERNATIVES = 4
+NEVER = 1e9  # cost of a branch that is none
+HOPELESS = 100.0  # cost of a path above the best beyond which it is not followed
+SETTLED = 3  # iterations after which the process noise changes little
+START = ProcessNoise(np.asarray(1e-8), np.asarray(1e-5))
+LOGARITHMS = (-16.0, 2.0)  # of densities: between no noise at all and no memory
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """A magnet's path through w windows.
+
+    times: (w,) s, the windows' middles.  position: (w, 3) m.  axis: (w, 3).  velocity: (w, 3) m/s.  covariance:
+    (w, 6, 6), of position and axis in the common frame.  faulty: (w,) windows whose samples do not fit the track.
+    noise: the process noise, stated or found.  log_evidence: how likely the samples are.  ambiguous: whether another
+    track is about as likely.  alternatives: the other tracks that were followed, likeliest first.  poses: what each
+    window says alone.  converged, iterations: of Gauss–Newton on the whole track.
+    """
+
+    times: Floats
+    position: Points
+    axis: Vectors
+    velocity: Vectors
+    covariance: Floats
+    faulty: Booleans
+    noise: ProcessNoise
+    log_evidence: float
+    ambiguous: bool
+    alternatives: tuple[Track, ...]
+    poses: Pose
+    converged: bool
+    iterations: int
+
+    @property
+    def position_deviation(self) -> Floats:
+        """(w,) m, root of the mean square distance from the true position that the covariance states."""
+        return np.asarray(np.sqrt(np.einsum("wii->w", self.covariance[:, :3, :3])))
+
+    @property
+    def axis_deviation(self) -> Floats:
+        """(w,) rad, root of the mean square angle from the true axis that the covariance states."""
+        return np.asarray(np.sqrt(np.einsum("wii->w", self.covariance[:, 3:, 3:])))
+
+
+@dataclass(frozen=True, eq=False)
+class _Windows:
+    """What all windows measured: quadratures and whitening (w, s, …), by which rotor and sensors."""
+
+    times: Floats
+    rotor: Rotor
+    array: SensorArray
+    measured: Measured
+
+
+def track(
+    samples: ArrayLike,
+    times: ArrayLike,
+    model: Model,
+    frequency: float | None = None,
+    sensors: Sensors = None,
+    *,
+    starts: ArrayLike,
+    near: ArrayLike | None = None,
+    noise: ProcessNoise | None = None,
+    rotation_axis: ArrayLike = (0.0, 0.0, 1.0),
+    strict: bool = True,
+) -> Track:
+    """The track of a magnet from w windows of samples.
+
+    samples: (w, n, 3) T of one sensor, (w, s, n, 3) of several; `windows` cuts them out of one record.  times: (n,) s
+    within a window.  starts: (w,) s, increasing, when the windows begin.  near: (3,) m, where the magnet was about in
+    the first window.  noise: the process noise; None to find it.  Otherwise as `localize`.
+
+    Raises InputError for fewer than three windows, ConvergenceError where the track did not converge and `strict`.
+    """
+    begin = np.asarray(starts, dtype=float)
+    if begin.ndim != 1 or begin.size < 3 or not np.all(np.diff(begin) > 0):
+        raise InputError("a track needs three windows or more, with starts (w,) in s that increase")
+    if np.shape(samples)[:1] != begin.shape:
+        raise InputError(f"{begin.size} windows need samples (w, …), got {np.shape(samples)}")
+    rotor, array = as_rotor(model, rotation_axis), as_sensors(sensors)
+    poses = localize(samples, times, rotor, frequency, sensors, strict=False)
+    middles = begin + float(np.mean(np.asarray(times, dtype=float)))
+    with one_thread_for_algebra():
+        seen = _Windows(middles, rotor, array, whitened(poses.fields, array))
+        paths = _paths(poses, middles, near)
+        found = [_follow(seen, poses, path, noise) for path in paths]
+    found = _distinct(sorted(found, key=lambda one: -one.log_evidence))
+    if near is not None:
+        where = np.asarray(near, dtype=float)
+        found.sort(key=lambda one: (one.log_evidence < found[0].log_evidence - 10.0, _apart(one, where)))
+    best = found[0]
+    if strict and not best.converged:
+        raise ConvergenceError(
+            f"the track did not converge in {best.iterations} steps; pass strict=False to see it all the same"
+        )
+    others = tuple(found[1:])
+    ambiguous = any(one.log_evidence > best.log_evidence - 3.0 for one in others)
+    return Track(**{**best.__dict__, "alternatives": others, "ambiguous": ambiguous})
+
+
+def windows(
+    samples: ArrayLike, times: ArrayLike, length: float, step: float | None = None
+) -> tuple[Floats, Floats, Floats]:
+    """Cut a record into windows of `length` s, one every `step` s (`length` unless stated).
+
+    samples: (..., n, 3), times (n,) s, evenly sampled. Returns samples (w, ..., k, 3), times (k,) within a window, and
+    starts (w,) s. Raises InputError where no window fits or the times are uneven.
+    """
+    b, t = np.asarray(samples, dtype=float), np.asarray(times, dtype=float)
+    if t.ndim != 1 or t.size < 2 or b.shape[-2:] != (t.size, 3):
+        raise InputError(f"samples must be (..., n, 3) and times (n,), got {b.shape} and {t.shape}")
+    interval = np.ptp(t) / (t.size - 1)
+    if not np.allclose(np.diff(t), interval, rtol=1e-3, atol=0):
+        raise InputError("windows are cut out of evenly sampled records: fill gaps with NaN")
+    count, hop = round(length / interval), round((length if step is None else step) / interval)
+    if hop < 1 or not 1 < count <= t.size:
+        raise InputError(
+            f"no window of {length:g} s, one every {length if step is None else step:g} s, fits the record"
+        )
+    first = np.arange(0, t.size - count + 1, hop)
+    cut = b[..., first[:, None] + np.arange(count), :]
+    return np.moveaxis(cut, -3, 0), t[:count] - t[0], t[first]
+
+
+def _paths(poses: Pose, times: Floats, near: ArrayLike | None) -> list[tuple[Points, Floats]]:
+    """Starts for the whole track: positions (w, 3) and frames (w, 3, 3), one for every branch of the surest window.
+
+    Each is the shortest path through the branches of all windows that goes by that branch (Viterbi's algorithm): costs
+    are the branches' likelihoods and the steps between them, in units of what noise and motion make of steps.
+    """
+    p = np.stack([one.position for one in poses.branches], axis=1)  # (w, k, 3)
+    a = np.stack([one.axis for one in poses.branches], axis=1)
+    phase = np.stack([one.phase for one in poses.branches], axis=1)
+    cost = np.stack([poses.log_likelihood - one.log_likelihood for one in poses.branches], axis=1)  # (w, k)
+    cost = np.minimum(cost, NEVER)
+    if near is not None:
+        cost[0] = cost[0] + 5 * np.linalg.norm(p[0] - np.asarray(near, dtype=float), axis=-1) / poses.distance[0]
+    # Deviations of positions are no more than the distance, of axes no more than a radian, however singular a window is.
+    distance = np.linalg.norm(p, axis=-1)
+    wide = np.stack([np.minimum(one.position_deviation, poses.distance) for one in poses.branches], axis=1)
+    turned = np.stack([np.minimum(one.axis_deviation, 1.0) for one in poses.branches], axis=1)
+    step = np.linalg.norm(p[1:, None, :, :] - p[:-1, :, None, :], axis=-1)  # (w − 1, k before, k after)
+    turn = np.linalg.norm(a[1:, None, :, :] - a[:-1, :, None, :], axis=-1)
+    usual = np.median(step.min(axis=(1, 2))), np.median(turn.min(axis=(1, 2)))
+    between = 0.5 * step**2 / (usual[0] ** 2 + wide[:-1, :, None] ** 2 + wide[1:, None, :] ** 2)
+    between += 0.5 * turn**2 / (usual[1] ** 2 + turned[:-1, :, None] ** 2 + turned[1:, None, :] ** 2)
+
+    forward, arrow_back = _sweep(cost, between)
+    backward, arrow_ahead = _sweep(cost[::-1], np.swapaxes(between, 1, 2)[::-1])
+    backward, arrow_ahead = backward[::-1], arrow_ahead[::-1]
+    through = forward + backward - cost
+    sure = int(np.argmin((wide / np.maximum(distance, 1e-12))[:, 0]))
+    chosen = []
+    for k in np.argsort(through[sure], kind="stable")[:ALTERNATIVES]:
+        if through[sure, k] > through[sure].min() + HOPELESS:
+            continue
+        path = np.empty(times.size, dtype=np.int64)
+        path[sure] = k
+        for w in range(sure, 0, -1):
+            path[w - 1] = arrow_back[w - 1, path[w]]
+        for w in range(sure, times.size - 1):
+            path[w + 1] = arrow_ahead[w, path[w]]
+        every = np.arange(times.size)
+        chosen.append((p[every, path], orientation(a[every, path], phase[every, path])))
+    return chosen
+
+
+def _sweep(cost: Floats, between: Floats) -> tuple[Floats, Floats]:
+    """Least costs (w, k) of paths that end at each branch, and for each step (w − 1, k) the branch it came from."""
+    total, arrows = [cost[0]], []
+    for w in range(len(between)):
+        way = total[-1][:, None] + between[w]
+        arrows.append(way.argmin(axis=0))
+        total.append(way.min(axis=0) + cost[w + 1])
+    return np.array(total), np.array(arrows)
+
+
+def _follow(seen: _Windows, poses: Pose, path: tuple[Points, Floats], noise: ProcessNoise | None) -> Track:
+    """Gauss–Newton on a whole track from a path, process noise found between the steps."""
+    p, R = path
+    expected = 6 * len(seen.array.sensors) - 1  # what is left of a window's misfit, but for the phase, is the track's
+    limit = float(chi2.isf(FAULTY, expected))
+    weight = np.ones(len(p))
+    used = START if noise is None else noise
+    change = np.inf
+    iterations = 0
+    while True:
+        likelihoods, phase_step = _likelihoods(seen, p, R, weight)
+        if noise is None:
+            used = _process_noise(seen.times, likelihoods, used, iterations)
+        found = smooth(seen.times, likelihoods, used)
+        if change < SMALL_CHANGE or iterations == MOST_ITERATIONS:
+            break
+        p, R, change = _moved(seen, p, R, found.state, phase_step)
+        misfit = _misfit(seen, p, R)
+        weight = np.minimum(1.0, limit / np.maximum(misfit, 1e-12))
+        iterations += 1
+    return _as_track(seen, poses, p, R, found, used, weight < 1.0, change < SMALL_CHANGE, iterations)
+
+
+def _likelihoods(seen: _Windows, p: Points, R: Floats, weight: Floats) -> tuple[Likelihoods, tuple[Floats, Floats]]:
+    """ℓ of every window about poses (w, 3), (w, 3, 3), its phase eliminated, and how the phase follows the rest."""
+    J, residual = linearised(seen.rotor, seen.array, p, R, seen.measured.quadratures, seen.measured.whitening)
+    J[..., :3] = np.einsum("wkj,wij->wki", J[..., :3], R)
+    J, residual = J * np.sqrt(weight)[:, None, None], residual * np.sqrt(weight)[:, None]
+    # A small change da of the axis is the turn δ_x = −ŷ·da, δ_y = x̂·da about the rotor's axes.
+    B = np.zeros((len(p), 6, 7))
+    B[:, :3, :3] = np.eye(3)
+    B[:, 3, 3:6] = -R[:, :, 1]
+    B[:, 4, 3:6] = R[:, :, 0]
+    B[:, 5, 6] = 1.0
+    J = J @ B
+    H = np.einsum("wki,wkj->wij", J, J)
+    g = np.einsum("wki,wk->wi", J, residual)
+    own = np.maximum(H[:, 6, 6], np.finfo(float).tiny)
+    ratio = H[:, 6, :6] / own[:, None]
+    information = H[:, :6, :6] - ratio[:, :, None] * H[:, None, 6, :6]
+    gradient = g[:, :6] - ratio * g[:, 6:]
+    misfit = np.einsum("wk,wk->w", residual, residual) - g[:, 6] ** 2 / own
+    axis = R[:, :, 2]
+    information[:, 3:, 3:] += axis[:, :, None] * axis[:, None, :] / UNIT_LENGTH**2
+    return (
+        Likelihoods(np.concatenate([p, axis], axis=-1), gradient, information, misfit),
+        (-g[:, 6] / own, -ratio),
+    )
+
+
+def _process_noise(times: Floats, measured: Likelihoods, last: ProcessNoise, iterations: int) -> ProcessNoise:
+    """The densities that predict the windows best, each from those before it, on ever finer grids of their logarithms.
+
+    Far from the end every iteration searches anew: what was found about a bad track may be far off.
+    """
+    begin, widths = (START, (4.0, 1.0, 0.25)) if iterations < SETTLED else (last, (0.5, 0.125))
+    centre = np.log10([float(begin.position), float(begin.axis)])
+    for width in widths:
+        steps = np.linspace(-width, width, 7)
+        first, second = (one.ravel() for one in np.meshgrid(centre[0] + steps, centre[1] + steps, indexing="ij"))
+        first, second = np.clip(first, *LOGARITHMS), np.clip(second, *LOGARITHMS)
+        evidence = kalman_filter(times, measured, ProcessNoise(10**first, 10**second)).log_evidence.sum(axis=-1)
+        best = int(np.argmax(evidence))
+        centre = np.array([first[best], second[best]])
+    return ProcessNoise(np.asarray(10 ** centre[0]), np.asarray(10 ** centre[1]))
+
+
+def _moved(
+    seen: _Windows, p: Points, R: Floats, state: Floats, phase_step: tuple[Floats, Floats]
+) -> tuple[Points, Floats, float]:
+    """Poses moved towards smoothed states (w, 12), by no more than is safe, and the largest change that was wanted."""
+    dp, da = state[:, :3] - p, state[:, 3:6] - R[:, :, 2]
+    along = np.einsum("wi,wij->wj", da, R)
+    distance = np.linalg.norm(p[:, None, :] - seen.array.positions, axis=-1).min(axis=-1)
+    wanted = np.maximum(np.linalg.norm(dp, axis=-1) / distance, np.linalg.norm(along[:, :2], axis=-1))
+    short = np.minimum(1.0, LONGEST_TURN / np.maximum(wanted, 1e-300))
+    change = np.concatenate([dp, da], axis=-1) * short[:, None]
+    turn = phase_step[0] + np.einsum("wi,wi->w", phase_step[1], change)
+    turn = np.clip(turn, -LONGEST_TURN, LONGEST_TURN)
+    delta = np.stack([-along[:, 1] * short, along[:, 0] * short, turn], axis=-1)
+    return p + change[:, :3], R @ rotation_matrix(delta), float(max(wanted.max(), np.abs(turn).max()))
+
+
+def _misfit(seen: _Windows, p: Points, R: Floats) -> Floats:
+    _, residual = linearised(seen.rotor, seen.array, p, R, seen.measured.quadratures, seen.measured.whitening)
+    return np.asarray(np.einsum("wk,wk->w", residual, residual))
+
+
+def _as_track(
+    seen: _Windows,
+    poses: Pose,
+    p: Points,
+    R: Floats,
+    found: Smoothed,
+    noise: ProcessNoise,
+    faulty: Booleans,
+    converged: bool,
+    iterations: int,
+) -> Track:
+    axis = found.state[:, 3:6] / np.linalg.norm(found.state[:, 3:6], axis=-1, keepdims=True)
+    across = np.eye(6) - np.zeros((len(p), 6, 6))
+    across[:, 3:, 3:] -= axis[:, :, None] * axis[:, None, :]
+    return Track(
+        times=seen.times,
+        position=found.state[:, :3],
+        axis=axis,
+        velocity=found.state[:, 6:9],
+        covariance=across @ found.covariance[:, :6, :6] @ across,
+        faulty=faulty,
+        noise=noise,
+        log_evidence=float(found.log_evidence.sum()),
+        ambiguous=False,
+        alternatives=(),
+        poses=poses,
+        converged=bool(converged),
+        iterations=iterations,
+    )
+
+
+def _distinct(found: list[Track]) -> list[Track]:
+    """Tracks without those that ended where a likelier one did."""
+    kept: list[Track] = []
+    for one in found:
+        size = np.median(np.linalg.norm(one.position, axis=-1))
+        if all(
+            np.abs(one.position - other.position).max() > 0.01 * size or np.abs(one.axis - other.axis).max() > 0.05
+            for other in kept
+        ):
+            kept.append(one)
+    return kept
+
+
+def _apart(one: Track, where: Floats) -> float:
+    return float(np.linalg.norm(one.position[0] - where))
