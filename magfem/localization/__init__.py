@@ -1,6 +1,7 @@
 """Localization: where a magnet is that turns about an axis, from the field that it makes at one sensor or more."""
 
 from magfem.localization.dipole_pose import DipolePoses, dipole_poses
+from magfem.localization.following import Belief, follow
 from magfem.localization.frequency import Frequency, Spectrum, find_frequency, spectrum
 from magfem.localization.localize import localize, localize_several, locate_field
 from magfem.localization.motion import ProcessNoise
@@ -12,6 +13,7 @@ from magfem.localization.simulated import simulated_samples
 from magfem.localization.tracking import Track, track, windows
 
 __all__ = [
+    "Belief",
     "Branch",
     "DipolePoses",
     "Frequency",
@@ -27,6 +29,7 @@ __all__ = [
     "demodulate_several",
     "dipole_poses",
     "find_frequency",
+    "follow",
     "localize",
     "localize_several",
     "locate_field",

@@ -182,8 +182,8 @@ def _located(
     if strict and not pose.converged.all():
         raise ConvergenceError(
             f"{np.count_nonzero(~pose.converged)} of {pose.converged.size} poses did not converge in "
-            f"{int(pose.iterations.max())} steps, residual {float(pose.residual[~pose.converged].max()):.3g} deviations; "
-            "pass strict=False to see them all the same"
+            f"{int(pose.iterations.max())} steps, residuals up to {float(pose.residual[~pose.converged].max()):.3g} "
+            "deviations; pass strict=False to see them all the same"
         )
     return pose
 

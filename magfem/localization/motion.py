@@ -1,7 +1,7 @@
 """How a tracked magnet moves between its poses: with nearly constant velocities, and Gaussian statistics of that.
 
-The state of a track is (p, a, ṗ, ȧ), twelve numbers: position and axis, and their rates. White acceleration drives both.
-The axis is a vector in space; that it has length one is a measurement, taken with every pose.
+The state of a track is (p, a, ṗ, ȧ), twelve numbers: position and axis, and their rates. White acceleration drives
+both. The axis is a vector in space; that it has length one is a measurement, taken with every pose.
 
 Poses enter as what the samples say near a point x₀ = (p₀, a₀), a quadratic log likelihood
 
@@ -35,7 +35,7 @@ class ProcessNoise:
 
 @dataclass(frozen=True, eq=False)
 class Likelihoods:
-    """ℓ above for w windows: place x₀ (..., w, 6), gradient g (..., w, 6), information Λ (..., w, 6, 6), χ² (..., w)."""
+    """ℓ above for w windows: place x₀, gradient g (..., w, 6), information Λ (..., w, 6, 6), χ² (..., w)."""
 
     place: Floats
     gradient: Floats
@@ -69,14 +69,14 @@ def diffusion(noise: ProcessNoise, duration: float) -> Floats:
 def update(
     state: Floats, covariance: Floats, place: Floats, gradient: Floats, information: Floats, misfit: Floats
 ) -> tuple[Floats, Floats, Floats]:
-    """State (..., 12), covariance (..., 12, 12) after a measurement, and its log evidence (...), ∫ e^ℓ under the prior."""
+    """State (..., 12) and covariance after a measurement, and its log evidence (...), ∫ e^ℓ under the prior."""
     S = covariance[..., :6, :6]
     gain = np.eye(6) + information @ S  # I + ΛS
     difference = state[..., :6] - place
-    slope = gradient + _times(information, difference)  # −∂ℓ/∂x at the prediction
-    right = np.empty((*slope.shape, 7))
+    slope: Floats = gradient + _times(information, difference)  # −∂ℓ/∂x at the prediction
+    right: Floats = np.empty((*slope.shape, 7))
     right[..., :6], right[..., 6] = information, slope
-    weighted = np.linalg.solve(gain, right)
+    weighted: Floats = np.asarray(np.linalg.solve(gain, right))
     solved, pull = weighted[..., :6], weighted[..., 6]  # (I + ΛS)⁻¹Λ and (I + ΛS)⁻¹ slope
     PH = covariance[..., :, :6]
     evidence = (
@@ -87,7 +87,8 @@ def update(
         - 0.5 * np.linalg.slogdet(gain)[1]
     )
     after = covariance - PH @ solved @ np.swapaxes(PH, -1, -2)
-    return state - _times(PH, pull), 0.5 * (after + np.swapaxes(after, -1, -2)), evidence
+    moved: Floats = state - _times(PH, pull)
+    return moved, 0.5 * (after + np.swapaxes(after, -1, -2)), np.asarray(evidence)
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,27 +12,29 @@ The magnet is taken to stand still during a window. One sensor alone cannot tell
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import chi2
 
 from magfem.errors import ConvergenceError, InputError
-from magfem.localization.localize import Model, Sensors, localize, whitened
+from magfem.localization.localize import localize, whitened
 from magfem.localization.motion import Likelihoods, ProcessNoise, Smoothed, kalman_filter, smooth
-from magfem.localization.orientation import orientation, rotation_matrix
+from magfem.localization.orientation import orientation
 from magfem.localization.pose import Pose
-from magfem.localization.refinement import Measured, linearised
-from magfem.localization.rotor import Rotor, as_rotor
-from magfem.localization.sensor import SensorArray, as_sensors
+from magfem.localization.rotor import Model, as_rotor
+from magfem.localization.sensor import Sensors, as_sensors
+from magfem.localization.window_likelihood import Windows, likelihoods, misfit, moved
 from magfem.threads import one_thread_for_algebra
 from magfem.typing import ArrayLike, Booleans, Floats, Points, Vectors
 
+log = logging.getLogger("magfem")
+
 MOST_ITERATIONS = 40
 SMALL_CHANGE = 1e-6  # of the distance, and rad
-LONGEST_TURN = 0.3  # rad an iteration may turn an axis by, and of the distance that it may move a position by
 FAULTY = 1e-4  # probability of a window's misfit below which it is told from the track
-UNIT_LENGTH = 0.3
+FEWEST_SAMPLES = 6  # of an axis in a window
 ALTERNATIVES = 4
 NEVER = 1e9  # cost of a branch that is none
 HOPELESS = 100.0  # cost of a path above the best beyond which it is not followed
@@ -77,16 +79,6 @@ class Track:
         return np.asarray(np.sqrt(np.einsum("wii->w", self.covariance[:, 3:, 3:])))
 
 
-@dataclass(frozen=True, eq=False)
-class _Windows:
-    """What all windows measured: quadratures and whitening (w, s, …), by which rotor and sensors."""
-
-    times: Floats
-    rotor: Rotor
-    array: SensorArray
-    measured: Measured
-
-
 def track(
     samples: ArrayLike,
     times: ArrayLike,
@@ -102,9 +94,10 @@ def track(
 ) -> Track:
     """The track of a magnet from w windows of samples.
 
-    samples: (w, n, 3) T of one sensor, (w, s, n, 3) of several; `windows` cuts them out of one record.  times: (n,) s
-    within a window.  starts: (w,) s, increasing, when the windows begin.  near: (3,) m, where the magnet was about in
-    the first window.  noise: the process noise; None to find it.  Otherwise as `localize`.
+    samples: (w, n, 3) T of one sensor, (w, s, n, 3) of several; `windows` cuts them out of one record. Windows with too
+    few samples are left out.  times: (n,) s within a window.  starts: (w,) s, increasing, when the windows begin.
+    near: (3,) m, where the magnet was about in the first window.  noise: the process noise; None to find it.
+    Otherwise as `localize`.
 
     Raises InputError for fewer than three windows, ConvergenceError where the track did not converge and `strict`.
     """
@@ -114,16 +107,16 @@ def track(
     if np.shape(samples)[:1] != begin.shape:
         raise InputError(f"{begin.size} windows need samples (w, …), got {np.shape(samples)}")
     rotor, array = as_rotor(model, rotation_axis), as_sensors(sensors)
+    samples, begin = _whole(samples, begin)
     poses = localize(samples, times, rotor, frequency, sensors, strict=False)
     middles = begin + float(np.mean(np.asarray(times, dtype=float)))
     with one_thread_for_algebra():
-        seen = _Windows(middles, rotor, array, whitened(poses.fields, array))
-        paths = _paths(poses, middles, near)
-        found = [_follow(seen, poses, path, noise) for path in paths]
+        seen = Windows(rotor, array, whitened(poses.fields, array))
+        found = [_follow(seen, middles, poses, path, noise) for path in _paths(poses, near)]
     found = _distinct(sorted(found, key=lambda one: -one.log_evidence))
     if near is not None:
-        where = np.asarray(near, dtype=float)
-        found.sort(key=lambda one: (one.log_evidence < found[0].log_evidence - 10.0, _apart(one, where)))
+        where, likeliest = np.asarray(near, dtype=float), found[0].log_evidence
+        found.sort(key=lambda one: (one.log_evidence < likeliest - 10.0, _apart(one, where)))
     best = found[0]
     if strict and not best.converged:
         raise ConvergenceError(
@@ -158,7 +151,21 @@ def windows(
     return np.moveaxis(cut, -3, 0), t[:count] - t[0], t[first]
 
 
-def _paths(poses: Pose, times: Floats, near: ArrayLike | None) -> list[tuple[Points, Floats]]:
+def _whole(samples: ArrayLike, begin: Floats) -> tuple[Floats, Floats]:
+    """The windows, and their starts, in which every sensor took enough samples to say something."""
+    b = np.asarray(samples, dtype=float)
+    axes = (*range(1, b.ndim - 2), b.ndim - 1)
+    enough = (np.isfinite(b).sum(axis=-2, keepdims=True) >= FEWEST_SAMPLES).all(axis=axes).reshape(-1)
+    if enough.sum() < 3:
+        raise InputError(
+            f"only {enough.sum()} of {enough.size} windows hold {FEWEST_SAMPLES} samples or more of each axis"
+        )
+    if not enough.all():
+        log.info("track: %d of %d windows hold too few samples and are left out", (~enough).sum(), enough.size)
+    return b[enough], begin[enough]
+
+
+def _paths(poses: Pose, near: ArrayLike | None) -> list[tuple[Points, Floats]]:
     """Starts for the whole track: positions (w, 3) and frames (w, 3, 3), one for every branch of the surest window.
 
     Each is the shortest path through the branches of all windows that goes by that branch (Viterbi's algorithm): costs
@@ -171,7 +178,7 @@ def _paths(poses: Pose, times: Floats, near: ArrayLike | None) -> list[tuple[Poi
     cost = np.minimum(cost, NEVER)
     if near is not None:
         cost[0] = cost[0] + 5 * np.linalg.norm(p[0] - np.asarray(near, dtype=float), axis=-1) / poses.distance[0]
-    # Deviations of positions are no more than the distance, of axes no more than a radian, however singular a window is.
+    # However singular a window is, deviations of positions are at most the distance, of axes a radian.
     distance = np.linalg.norm(p, axis=-1)
     wide = np.stack([np.minimum(one.position_deviation, poses.distance) for one in poses.branches], axis=1)
     turned = np.stack([np.minimum(one.axis_deviation, 1.0) for one in poses.branches], axis=1)
@@ -190,13 +197,13 @@ def _paths(poses: Pose, times: Floats, near: ArrayLike | None) -> list[tuple[Poi
     for k in np.argsort(through[sure], kind="stable")[:ALTERNATIVES]:
         if through[sure, k] > through[sure].min() + HOPELESS:
             continue
-        path = np.empty(times.size, dtype=np.int64)
+        path = np.empty(len(p), dtype=np.int64)
         path[sure] = k
         for w in range(sure, 0, -1):
             path[w - 1] = arrow_back[w - 1, path[w]]
-        for w in range(sure, times.size - 1):
+        for w in range(sure, len(p) - 1):
             path[w + 1] = arrow_ahead[w, path[w]]
-        every = np.arange(times.size)
+        every = np.arange(len(p))
         chosen.append((p[every, path], orientation(a[every, path], phase[every, path])))
     return chosen
 
@@ -211,7 +218,9 @@ def _sweep(cost: Floats, between: Floats) -> tuple[Floats, Floats]:
     return np.array(total), np.array(arrows)
 
 
-def _follow(seen: _Windows, poses: Pose, path: tuple[Points, Floats], noise: ProcessNoise | None) -> Track:
+def _follow(
+    seen: Windows, times: Floats, poses: Pose, path: tuple[Points, Floats], noise: ProcessNoise | None
+) -> Track:
     """Gauss–Newton on a whole track from a path, process noise found between the steps."""
     p, R = path
     expected = 6 * len(seen.array.sensors) - 1  # what is left of a window's misfit, but for the phase, is the track's
@@ -221,44 +230,18 @@ def _follow(seen: _Windows, poses: Pose, path: tuple[Points, Floats], noise: Pro
     change = np.inf
     iterations = 0
     while True:
-        likelihoods, phase_step = _likelihoods(seen, p, R, weight)
+        measured, phase = likelihoods(seen, p, R, weight)
         if noise is None:
-            used = _process_noise(seen.times, likelihoods, used, iterations)
-        found = smooth(seen.times, likelihoods, used)
+            used = _process_noise(times, measured, used, iterations)
+        found = smooth(times, measured, used)
         if change < SMALL_CHANGE or iterations == MOST_ITERATIONS:
             break
-        p, R, change = _moved(seen, p, R, found.state, phase_step)
-        misfit = _misfit(seen, p, R)
-        weight = np.minimum(1.0, limit / np.maximum(misfit, 1e-12))
+        p, R, changes = moved(seen, p, R, found.state, phase)
+        change = float(changes.max())
         iterations += 1
-    return _as_track(seen, poses, p, R, found, used, weight < 1.0, change < SMALL_CHANGE, iterations)
-
-
-def _likelihoods(seen: _Windows, p: Points, R: Floats, weight: Floats) -> tuple[Likelihoods, tuple[Floats, Floats]]:
-    """ℓ of every window about poses (w, 3), (w, 3, 3), its phase eliminated, and how the phase follows the rest."""
-    J, residual = linearised(seen.rotor, seen.array, p, R, seen.measured.quadratures, seen.measured.whitening)
-    J[..., :3] = np.einsum("wkj,wij->wki", J[..., :3], R)
-    J, residual = J * np.sqrt(weight)[:, None, None], residual * np.sqrt(weight)[:, None]
-    # A small change da of the axis is the turn δ_x = −ŷ·da, δ_y = x̂·da about the rotor's axes.
-    B = np.zeros((len(p), 6, 7))
-    B[:, :3, :3] = np.eye(3)
-    B[:, 3, 3:6] = -R[:, :, 1]
-    B[:, 4, 3:6] = R[:, :, 0]
-    B[:, 5, 6] = 1.0
-    J = J @ B
-    H = np.einsum("wki,wkj->wij", J, J)
-    g = np.einsum("wki,wk->wi", J, residual)
-    own = np.maximum(H[:, 6, 6], np.finfo(float).tiny)
-    ratio = H[:, 6, :6] / own[:, None]
-    information = H[:, :6, :6] - ratio[:, :, None] * H[:, None, 6, :6]
-    gradient = g[:, :6] - ratio * g[:, 6:]
-    misfit = np.einsum("wk,wk->w", residual, residual) - g[:, 6] ** 2 / own
-    axis = R[:, :, 2]
-    information[:, 3:, 3:] += axis[:, :, None] * axis[:, None, :] / UNIT_LENGTH**2
-    return (
-        Likelihoods(np.concatenate([p, axis], axis=-1), gradient, information, misfit),
-        (-g[:, 6] / own, -ratio),
-    )
+        if iterations >= SETTLED:  # before, it may be the track that does not fit the windows
+            weight = np.minimum(1.0, limit / np.maximum(misfit(seen, p, R), 1e-12))
+    return _as_track(times, poses, found, used, weight < 1.0, change < SMALL_CHANGE, iterations)
 
 
 def _process_noise(times: Floats, measured: Likelihoods, last: ProcessNoise, iterations: int) -> ProcessNoise:
@@ -278,32 +261,9 @@ def _process_noise(times: Floats, measured: Likelihoods, last: ProcessNoise, ite
     return ProcessNoise(np.asarray(10 ** centre[0]), np.asarray(10 ** centre[1]))
 
 
-def _moved(
-    seen: _Windows, p: Points, R: Floats, state: Floats, phase_step: tuple[Floats, Floats]
-) -> tuple[Points, Floats, float]:
-    """Poses moved towards smoothed states (w, 12), by no more than is safe, and the largest change that was wanted."""
-    dp, da = state[:, :3] - p, state[:, 3:6] - R[:, :, 2]
-    along = np.einsum("wi,wij->wj", da, R)
-    distance = np.linalg.norm(p[:, None, :] - seen.array.positions, axis=-1).min(axis=-1)
-    wanted = np.maximum(np.linalg.norm(dp, axis=-1) / distance, np.linalg.norm(along[:, :2], axis=-1))
-    short = np.minimum(1.0, LONGEST_TURN / np.maximum(wanted, 1e-300))
-    change = np.concatenate([dp, da], axis=-1) * short[:, None]
-    turn = phase_step[0] + np.einsum("wi,wi->w", phase_step[1], change)
-    turn = np.clip(turn, -LONGEST_TURN, LONGEST_TURN)
-    delta = np.stack([-along[:, 1] * short, along[:, 0] * short, turn], axis=-1)
-    return p + change[:, :3], R @ rotation_matrix(delta), float(max(wanted.max(), np.abs(turn).max()))
-
-
-def _misfit(seen: _Windows, p: Points, R: Floats) -> Floats:
-    _, residual = linearised(seen.rotor, seen.array, p, R, seen.measured.quadratures, seen.measured.whitening)
-    return np.asarray(np.einsum("wk,wk->w", residual, residual))
-
-
 def _as_track(
-    seen: _Windows,
+    times: Floats,
     poses: Pose,
-    p: Points,
-    R: Floats,
     found: Smoothed,
     noise: ProcessNoise,
     faulty: Booleans,
@@ -311,10 +271,10 @@ def _as_track(
     iterations: int,
 ) -> Track:
     axis = found.state[:, 3:6] / np.linalg.norm(found.state[:, 3:6], axis=-1, keepdims=True)
-    across = np.eye(6) - np.zeros((len(p), 6, 6))
+    across = np.tile(np.eye(6), (times.size, 1, 1))
     across[:, 3:, 3:] -= axis[:, :, None] * axis[:, None, :]
     return Track(
-        times=seen.times,
+        times=times,
         position=found.state[:, :3],
         axis=axis,
         velocity=found.state[:, 6:9],

@@ -1,0 +1,212 @@
+"""Following a magnet live: one window of samples after another, each judged by all before it.
+
+What is believed after a window is a few hypotheses, each a state of `motion` with its weight. A new window is explained
+from every hypothesis' prediction, beginning both at the prediction and at each branch that the window offers by itself,
+by Gauss–Newton on prior and samples together (an iterated Kalman filter). What ends at the same pose is merged, what is
+hopeless dropped. So a first window that is ambiguous is decided by later ones, and a faulty window moves nothing by
+more than its inflated covariance allows.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2
+
+from magfem.errors import InputError
+from magfem.localization.localize import localize, whitened
+from magfem.localization.motion import DIFFUSE, ProcessNoise, diffusion, transition, update
+from magfem.localization.orientation import orientation
+from magfem.localization.pose import Pose
+from magfem.localization.refinement import Measured
+from magfem.localization.rotor import Model, as_rotor
+from magfem.localization.sensor import Sensors, as_sensors
+from magfem.localization.window_likelihood import Windows, likelihoods, misfit, moved
+from magfem.threads import one_thread_for_algebra
+from magfem.typing import ArrayLike, Floats, Points, Vectors
+
+MOST_HYPOTHESES = 4
+MOST_ITERATIONS = 30
+SMALL_CHANGE = 1e-5  # of the distance, and rad
+HOPELESS = 12.0  # log weight behind the best below which a hypothesis is dropped
+SETTLED = 3  # steps before a misfit may be the window's fault
+FAULTY = 1e-4  # probability of a window's misfit below which its covariance is inflated
+SAME = (0.02, 0.05)  # of the distance, and rad: hypotheses nearer to each other are one
+
+
+@dataclass(frozen=True, eq=False)
+class Belief:
+    """What is believed of a magnet at `time` (s); h hypotheses, likeliest first.
+
+    state: (h, 12), see `motion`.  state_covariance: (h, 12, 12).  frame: (h, 3, 3), orientation at time zero of the
+    window.
+    log_weight: (h,), zero for the first.  faulty: whether the last window did not fit what was predicted.  pose:
+    what that window says alone.
+    """
+
+    time: float
+    state: Floats
+    state_covariance: Floats
+    frame: Floats
+    log_weight: Floats
+    faulty: bool
+    pose: Pose
+
+    @property
+    def position(self) -> Points:
+        """(3,) m."""
+        return np.asarray(self.state[0, :3])
+
+    @property
+    def axis(self) -> Vectors:
+        """(3,) unit vector."""
+        return np.asarray(self.state[0, 3:6] / np.linalg.norm(self.state[0, 3:6]))
+
+    @property
+    def velocity(self) -> Vectors:
+        """(3,) m/s."""
+        return np.asarray(self.state[0, 6:9])
+
+    @property
+    def covariance(self) -> Floats:
+        """(6, 6) of position and axis."""
+        across = np.eye(6)
+        across[3:, 3:] -= np.outer(self.axis, self.axis)
+        return np.asarray(across @ self.state_covariance[0, :6, :6] @ across)
+
+    @property
+    def ambiguous(self) -> bool:
+        """Whether another hypothesis is about as likely."""
+        return bool(np.any(self.log_weight[1:] > self.log_weight[0] - 3.0))
+
+
+def follow(
+    belief: Belief | None,
+    samples: ArrayLike,
+    times: ArrayLike,
+    model: Model,
+    frequency: float | None = None,
+    sensors: Sensors = None,
+    *,
+    start: float = 0.0,
+    noise: ProcessNoise,
+    near: ArrayLike | None = None,
+    rotation_axis: ArrayLike = (0.0, 0.0, 1.0),
+) -> Belief:
+    """What is believed after one more window; `belief` is None for the first.
+
+    samples: (n, 3) T of one sensor, (s, n, 3) of several.  times: (n,) s, after the window's `start` (s).  noise: the
+    process noise, such as `track` found on a record.  near: (3,) m, where the magnet is about in the first window; a
+    `Rotor` as `model` saves building it anew. Otherwise as `localize`. Raises InputError for a window that is not after
+    the last.
+    """
+    rotor, array = as_rotor(model, rotation_axis), as_sensors(sensors)
+    time = start + float(np.mean(np.asarray(times, dtype=float)))
+    if belief is not None and not time > belief.time:
+        raise InputError(f"windows must follow each other in time: {time:g} s is not after {belief.time:g} s")
+    pose = localize(samples, times, rotor, frequency, sensors, strict=False)
+    if pose.position.ndim != 1:
+        raise InputError("follow takes one window at a time; a whole record is for track")
+    with one_thread_for_algebra():
+        measured = whitened(pose.fields, array)
+        prior = _first(pose, near) if belief is None else _predicted(belief, pose, time, noise)
+        many = len(prior.state)
+        seen = Windows(
+            rotor,
+            array,
+            Measured(
+                np.repeat(measured.quadratures[None], many, axis=0), np.repeat(measured.whitening[None], many, axis=0)
+            ),
+        )
+        return _explained(seen, prior, pose, time)
+
+
+@dataclass(frozen=True, eq=False)
+class _Prior:
+    """What is expected (n, 12), (n, 12, 12), how likely that was (n,), and where to begin (n, 3), (n, 3, 3)."""
+
+    state: Floats
+    covariance: Floats
+    log_weight: Floats
+    position: Points
+    frame: Floats
+
+
+def _offered(pose: Pose) -> tuple[Points, Floats]:
+    """Positions (k, 3) and frames (k, 3, 3) of a window's branches."""
+    branches = [one for one in pose.branches if np.isfinite(one.log_likelihood)]
+    axes, phases = np.array([one.axis for one in branches]), np.array([one.phase for one in branches])
+    return np.array([one.position for one in branches]), orientation(axes, phases)
+
+
+def _first(pose: Pose, near: ArrayLike | None) -> _Prior:
+    """Nothing is known but, with `near`, about where the magnet is."""
+    position, frame = _offered(pose)
+    count = len(position)
+    weight: Floats = np.zeros(count)
+    if near is not None:
+        weight -= HOPELESS * np.linalg.norm(position - np.asarray(near, dtype=float), axis=-1) / pose.distance
+    state = np.concatenate([position, frame[:, :, 2], np.zeros((count, 6))], axis=-1)
+    return _Prior(state, np.tile(np.diag(DIFFUSE), (count, 1, 1)), weight, position, frame)
+
+
+def _predicted(belief: Belief, pose: Pose, time: float, noise: ProcessNoise) -> _Prior:
+    """Every hypothesis at the new time, to be met from where it is expected and from each branch of the window."""
+    duration = time - belief.time
+    F = transition(duration)
+    state = belief.state @ F.T
+    covariance = F @ belief.state_covariance @ F.T + diffusion(noise, duration)
+    offered_position, offered_frame = _offered(pose)
+    hypotheses, starts = len(state), 1 + len(offered_position)
+    axis = state[:, 3:6] / np.linalg.norm(state[:, 3:6], axis=-1, keepdims=True)
+    expected = orientation(axis, np.full(hypotheses, pose.phase))
+    position = np.concatenate(
+        [state[:, None, :3], np.broadcast_to(offered_position, (hypotheses, starts - 1, 3))], axis=1
+    )
+    frame = np.concatenate([expected[:, None], np.broadcast_to(offered_frame, (hypotheses, starts - 1, 3, 3))], axis=1)
+    return _Prior(
+        np.repeat(state, starts, axis=0),
+        np.repeat(covariance, starts, axis=0),
+        np.repeat(belief.log_weight, starts),
+        position.reshape(-1, 3),
+        frame.reshape(-1, 3, 3),
+    )
+
+
+def _explained(seen: Windows, prior: _Prior, pose: Pose, time: float) -> Belief:
+    p, R = prior.position, prior.frame
+    weight = np.ones(len(p))
+    limit = float(chi2.isf(FAULTY, 6 * len(seen.array.sensors) - 1))
+    for iteration in range(MOST_ITERATIONS):
+        said, phase = likelihoods(seen, p, R, weight)
+        state, covariance, evidence = update(
+            prior.state, prior.covariance, said.place, said.gradient, said.information, said.misfit
+        )
+        p, R, changes = moved(seen, p, R, state, phase)
+        if iteration >= SETTLED:
+            weight = np.minimum(1.0, limit / np.maximum(misfit(seen, p, R), 1e-12))
+        if changes.max() < SMALL_CHANGE and iteration > SETTLED:
+            break
+    score = prior.log_weight + evidence
+    order = np.argsort(-score, kind="stable")
+    kept: list[int] = []
+    for one in order[score[order] > score.max() - HOPELESS]:
+        distance = np.linalg.norm(p[one])
+        apart = [
+            np.linalg.norm(p[one] - p[other]) > SAME[0] * distance
+            or np.linalg.norm(R[one, :, 2] - R[other, :, 2]) > SAME[1]
+            for other in kept
+        ]
+        if all(apart):
+            kept.append(int(one))
+    kept = kept[:MOST_HYPOTHESES]
+    return Belief(
+        time=time,
+        state=state[kept],
+        state_covariance=covariance[kept],
+        frame=R[kept],
+        log_weight=score[kept] - score.max(),
+        faulty=bool(weight[kept[0]] < 1.0),
+        pose=pose,
+    )
