@@ -16,8 +16,9 @@ from magfem.errors import ConvergenceError, InputError
 from magfem.units import format_quantity, quantity, quoted
 
 if TYPE_CHECKING:
+    from magfem.localization import Pose
     from magfem.localization.recorded import Setup
-    from magfem.samples.recording import Recording
+    from magfem.samples.recording import Recording, Windows
 
 LIVE_WINDOW = 2.0  # s
 _MOST_ROWS = 40  # of poses on a terminal
@@ -40,6 +41,7 @@ def add(commands: CommandLine) -> None:
             "magfem localize --model rotor_1x3 --samples samples.csv -o poses.json",
             "magfem localize --model rotor_1x3 --samples s.csv --frequency 0.5 --near '20 5 30 mm' --window 2",
             "magfem localize --model rotor_1x3 --samples s.csv --sensors array.toml --frequency 0.5 --frequency 0.8",
+            "magfem localize --model rotor_1x3 --samples s.csv --sensors array.toml --window 2 --track -o track.json",
             "logger | magfem localize --model rotor_1x3 --samples - --columns t_ms,bx_uT,by_uT,bz_uT --json",
         ],
     )
@@ -79,6 +81,9 @@ def add(commands: CommandLine) -> None:
         "--window", metavar="SECONDS", help=f"length of samples for a pose (default: all of them; {LIVE_WINDOW:g} live)"
     )
     windows.add_argument("--step", metavar="SECONDS", help="from one window to the next (default: the window)")
+    windows.add_argument(
+        "--track", action="store_true", help="all windows as one track of a magnet that moves smoothly"
+    )
 
 
 def run(options: Namespace) -> int:
@@ -88,11 +93,13 @@ def run(options: Namespace) -> int:
     if options.samples == "-":
         from magfem.cli.live import localize_live
 
-        if picture:
-            raise InputError("--picture is for samples in a file, not for live ones")
+        for option in ("picture", "track"):
+            if getattr(options, option):
+                raise InputError(f"--{option} is for samples in a file, not for live ones")
         return localize_live(options, output)
-    if options.step and not options.window:
-        raise InputError("--step is for windows: state --window as well")
+    for option in ("step", "track"):
+        if getattr(options, option) and not options.window:
+            raise InputError(f"--{option} is for windows: state --window as well")
     from magfem.files import write_bytes, write_json
     from magfem.localization.poses_file import poses_to_dict
     from magfem.samples import parse_columns
@@ -113,10 +120,16 @@ def run(options: Namespace) -> int:
     else:
         pieces, length = windows.within(recording), windows.length
     located = Located(setup, near)
-    for start, piece in pieces:
-        located.add(piece, start, length, fatal=len(pieces) == 1)
-    if not located.entries:
-        raise InputError(f"no window gives a pose: {located.left_out[0]['reason']} [{options.samples}]")
+    if options.track:
+        assert windows is not None  # refused above
+        located.track(recording, windows)
+        if picture:
+            located.last = Located(setup, [located.entries[-1]["position"]]).poses(pieces[-1][1])[0]
+    else:
+        for start, piece in pieces:
+            located.add(piece, start, length, fatal=len(pieces) == 1)
+        if not located.entries:
+            raise InputError(f"no window gives a pose: {located.left_out[0]['reason']} [{options.samples}]")
     data = poses_to_dict(located.entries, options.model, recording.source, setup.sensors, located.left_out)
     drawn = None
     if picture:
@@ -141,16 +154,15 @@ class Located:
         self.setup, self.near = setup, near
         self.entries: list[dict[str, Any]] = []
         self.left_out: list[dict[str, Any]] = []
-        self.last: tuple[Any, ...] = ()
+        self.last: tuple[Pose, ...] = ()
 
     def add(self, piece: Recording, start: float, length: float, fatal: bool = False) -> list[dict[str, Any]]:
         """The poses of a window, one for every motor; none when it gives none, or the error itself if `fatal`."""
         from magfem.localization.poses_file import pose_to_dict
-        from magfem.localization.recorded import localize_recording
 
         time = start + length / 2
         try:
-            poses, names = localize_recording(piece, self.setup, self.near)
+            poses, names = self.poses(piece)
         except (InputError, ConvergenceError) as error:
             if fatal:
                 raise
@@ -162,6 +174,23 @@ class Located:
         if self.near is not None:
             self.near = poses
         return found
+
+    def poses(self, piece: Recording) -> tuple[tuple[Pose, ...], tuple[str, ...]]:
+        """The poses of a window, and the names of the sensors that took part. Raises InputError, ConvergenceError."""
+        from magfem.localization.recorded import localize_recording
+
+        return localize_recording(piece, self.setup, self.near)
+
+    def track(self, recording: Recording, windows: Windows) -> None:
+        """All windows of a recording as one track. Raises InputError, ConvergenceError."""
+        from magfem.localization.poses_file import track_to_dicts
+        from magfem.localization.recorded import track_recording
+
+        length = windows.length
+        near = self.near[0] if self.near else None
+        found, starts, missed, names = track_recording(recording, self.setup, length, windows.step, near)
+        self.entries = track_to_dicts(found, starts, length, names)
+        self.left_out = [{"time": start + length / 2, "reason": "too few samples"} for start in missed.tolist()]
 
 
 def stated_setup(options: Namespace) -> tuple[Setup, list[Any] | None]:
@@ -199,7 +228,7 @@ def stated_rate(options: Namespace) -> float | None:
     return None if options.rate is None else _positive(options.rate, "frequency", "--rate")
 
 
-def stated_windows(options: Namespace) -> Any:
+def stated_windows(options: Namespace) -> Windows:
     """--window and --step, the live defaults where they are not given."""
     from magfem.samples.recording import Windows
 

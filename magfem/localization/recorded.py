@@ -14,6 +14,7 @@ from magfem.localization.pose import Pose
 from magfem.localization.rotor import Rotor
 from magfem.localization.sensor import Sensor
 from magfem.localization.signal import demodulate
+from magfem.localization.tracking import Track, track, windows
 from magfem.samples.recording import Recording
 from magfem.typing import ArrayLike, Floats
 from magfem.units import quoted
@@ -90,6 +91,27 @@ def localize_recording(
         return (_converged(_of_separate_times(samples, times, setup, sensors, prior[0])),), names
     pose = localize(samples, times, setup.rotor, frequency, sensors, near=prior[0], drift=setup.drift, strict=False)
     return (_converged(pose),), names
+
+
+def track_recording(
+    recording: Recording, setup: Setup, length: float, step: float, near: ArrayLike | None = None
+) -> tuple[Track, Floats, Floats, tuple[str, ...]]:
+    """The track of one magnet through windows of `length` s, one every `step` s.
+
+    The recording must be evenly sampled but for gaps, by all sensors at once. Returns the track, the starts (w,) s of
+    its windows, those of windows with too few samples, and the sensors' names. Raises InputError and ConvergenceError
+    as `track` does.
+    """
+    if setup.motors > 1 or setup.drift:
+        raise InputError("a track is that of a single magnet, whose frequency does not drift")
+    times, samples, names = recording.evenly()
+    sensors = [setup.sensor(name) for name in names]
+    cut, within, starts = windows(samples, times, length, step)
+    frequency = setup.frequencies[0] if setup.frequencies else None
+    found = track(cut, within, setup.rotor, frequency, sensors, starts=starts, near=near)
+    kept = found.times - float(within.mean())
+    left_out = starts[np.abs(starts[:, None] - kept).min(axis=1) > 0.25 * step]
+    return found, kept, left_out, names
 
 
 def _converged(pose: Pose) -> Pose:

@@ -12,6 +12,8 @@ from magfem.errors import InputError
 from magfem.typing import Booleans, Floats, Integers, Vectors
 
 MOST_WINDOWS = 1_000_000
+MOST_EVEN = 10_000_000  # readings of a sensor, gaps filled
+UNEVEN = 0.25  # of an interval
 _ROUNDING = 1e-5  # of a step, by which windows begin earlier: a sample at 0.3 s must not fall before 3 × 0.1 s
 
 
@@ -52,6 +54,27 @@ class Recording:
         B[self.sensor, place] = self.B
         read = ~np.isnan(B).all(axis=(1, 2))
         return times, B[read], tuple(name for name, one in zip(self.sensors, read, strict=True) if one)
+
+    def evenly(self) -> tuple[Floats, Vectors, tuple[str, ...]]:
+        """As `side_by_side`, at times (m,) that are `interval` apart throughout: NaN where a gap was.
+
+        Raises InputError for readings that are not on such times, and for gaps too long to be filled.
+        """
+        times, B, names = self.side_by_side()
+        interval = self.interval
+        if not interval or np.ptp(times) / interval > MOST_EVEN:
+            raise InputError(f"{len(times)} readings in {np.ptp(times):g} s cannot be laid out evenly")
+        place = np.rint((times - times[0]) / interval).astype(np.int64)
+        off = times - times[0] - place * interval
+        if np.abs(off).max() > UNEVEN * interval or np.any(np.diff(place) == 0):
+            worst = int(np.argmax(np.abs(off)))
+            raise InputError(
+                f"the readings are not even: that at t = {times[worst]:.9g} s is {abs(off[worst]):.2g} s off times "
+                f"{interval:g} s apart, the same for all sensors"
+            )
+        filled = np.full((len(B), int(place[-1]) + 1, 3), np.nan)
+        filled[:, place] = B
+        return times[0] + interval * np.arange(filled.shape[1]), filled, names
 
 
 @dataclass(frozen=True)

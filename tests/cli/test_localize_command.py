@@ -194,6 +194,56 @@ def test_several_motors_have_a_pose_each(here: Path, capsys: pytest.CaptureFixtu
         assert pose["phase"] == pytest.approx(true.phase, abs=1e-5)
 
 
+def test_a_track_is_nearer_than_its_windows(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A magnet on an arc at 30 mm, 3 µT of noise: the smoothed windows are nearer to it than each alone, their
+    deviations tell how near, and a gap leaves windows out without losing the way.
+    """
+    middles = np.arange(1, 60, 2.0)
+    path = [
+        Turning([0.01 * np.sin(t / 20), 0.008 * np.cos(t / 25), 0.028 + 5e-5 * t], [0.3, np.sin(t / 30), 1.0])
+        for t in middles
+    ]
+    t = np.arange(1200) / 20.0
+    keep = (t < 24) | (t >= 28)
+    rows = []
+    for seed, (name, place) in enumerate(PLACES.items()):
+        B = np.concatenate([one.field(place, t[40 * k : 40 * k + 40]) for k, one in enumerate(path)])
+        B = read_by(name, B) + 3e-6 * np.random.default_rng(seed).normal(size=B.shape)
+        rows += [
+            f"{a!r},{name}," + ",".join(map(repr, b)) for a, b in zip(t[keep].tolist(), B[keep].tolist(), strict=True)
+        ]
+    Path("s.csv").write_text("\n".join(["t,sensor,bx,by,bz", *rows]) + "\n")
+    Path("pair.toml").write_text(CARD.replace("0.3 uT", "3 uT"))
+    words = ["--sensors", "pair.toml", "--frequency", "0.5", "--window", "2"]
+    alone = found(capsys, *FILE, *words)["poses"]
+    data = found(capsys, *FILE, *words, "--track", "--picture", "p.png", "-o", "track.json")
+    assert [one["time"] for one in data["left_out"]] == pytest.approx([25.0, 27.0])
+    assert Path("p.png").exists() and json.loads(Path("track.json").read_text()) == data
+
+    def off(poses: Any) -> Array:
+        truth = [path[round((pose["time"] - 1) / 2)].position for pose in poses]
+        return np.array([pose["position"] for pose in poses]) - truth
+
+    smoothed = data["poses"]
+    assert len(smoothed) == 28
+    near = np.sqrt((off(smoothed) ** 2).sum(axis=1).mean())
+    assert near < 1.5e-3 and near < 0.6 * np.sqrt((off(alone) ** 2).sum(axis=1).mean())
+    normalised = [
+        e @ np.linalg.solve(np.array(pose["covariance"])[:3, :3], e) / 3
+        for e, pose in zip(off(smoothed), smoothed, strict=True)
+    ]
+    assert 0.4 < np.mean(normalised) < 2.0
+    for pose in smoothed:
+        one = path[round((pose["time"] - 1) / 2)]
+        C = np.array(pose["covariance"])
+        assert np.linalg.eigvalsh(C)[0] > 0 and np.trace(C[3:5, 3:5]) == pytest.approx(pose["axis_deviation"] ** 2)
+        assert angle(pose["axis"], one.unit) < 5 * np.degrees(pose["axis_deviation"])
+        jump = pose["phase"] - one.phase
+        assert abs(np.angle(np.exp(1j * jump))) < 6 * np.sqrt(C[5, 5]) < 0.8
+        assert pose["branches"][0]["position"] == pose["position"] and not pose["ambiguous"]
+        assert abs(np.dot(pose["moment_direction"], pose["axis"])) < 1e-9
+
+
 def test_the_rotation_axis_in_the_models_frame(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The dipole lies along x of its model: about y or z it turns alike, about x not at all."""
     for axis in ("y", "z", "0, 1, -1"):
@@ -275,6 +325,9 @@ def test_a_picture(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
         ("--window 31", "30 s of samples are less than a window of 31 s"),
         ("--window 0.15 --frequency 0.5", "no window gives a pose"),
         ("--step 1", "--step is for windows"),
+        ("--track", "--track is for windows"),
+        ("--track --window 2 --frequency 0.5 --frequency 1", "a track is that of a single magnet"),
+        ("--track --window 12", "a track needs three windows"),
         ("--window 2 --step -1", "--step must be a positive number of s"),
         ("--sensors gone.toml", "no such file"),
         ("--sensors pair.toml", "a column sensor is needed"),

@@ -182,6 +182,7 @@ def test_several_sensors_one_of_them_unknown(
         (joined(lines()), "--frequency 10", "10 Hz is not below half the rate of the samples (20 Hz)"),
         (joined(lines()), "--window 0", "--window must be a positive number of s"),
         (joined(lines()), "--picture p.png", "--picture is for samples in a file"),
+        (joined(lines()), "--track", "--track is for samples in a file"),
         (joined(lines()), "-o nowhere/p.json", "there is no folder"),
     ],
 )

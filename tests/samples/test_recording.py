@@ -128,6 +128,20 @@ def steady(rate: float, n: int) -> Recording:
     return Recording(np.arange(n) / rate, np.ones((n, 3)), np.zeros(n, dtype=np.int64), ("",))
 
 
+def test_laid_out_evenly(file: Path) -> None:
+    """Times that logging rounds are those that were meant; a gap is filled with nothing."""
+    file.write_text("t,bx,by,bz\n0.301,1,1,1\n0.4,2,2,2\n0.499,3,3,3\n0.8,4,4,4\n0.9,5,5,5\n")
+    times, B, names = read_recording(file).evenly()
+    assert names == ("",) and len(times) == 7 and np.diff(times) == pytest.approx(0.1, rel=0.02)
+    assert np.array_equal(B[0, :, 0], [1, 2, 3, NAN, NAN, 4, 5], equal_nan=True)
+    file.write_text("t,bx,by,bz\n0,1,1,1\n0.1,2,2,2\n0.2,3,3,3\n0.24,4,4,4\n0.34,4,4,4\n")
+    with pytest.raises(InputError, match=r"not even: that at t = 0\.24 s is 0\.04 s off times 0\.1 s apart"):
+        read_recording(file).evenly()
+    file.write_text("t,bx,by,bz\n0,1,1,1\n")
+    with pytest.raises(InputError, match="cannot be laid out evenly"):
+        read_recording(file).evenly()
+
+
 def test_windows_are_as_long_as_they_say() -> None:
     """600 samples at 20 Hz are 30 s: 15 windows of 2 s with 40 samples each, 29 of them every second."""
     found = Windows(2.0, 2.0).within(steady(20.0, 600))
