@@ -10,7 +10,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from magfem.cli.localize import Located, pose_line, stated_rate, stated_setup, stated_windows
+from magfem.cli.localize import stated_rate, stated_setup, stated_windows
+from magfem.cli.located import Located
+from magfem.cli.pose_text import pose_line
 from magfem.errors import InputError
 from magfem.units import one_line
 
@@ -98,12 +100,13 @@ class _Live:
             if not self._rate_checked:
                 self.located.setup.check_rate(piece)
                 self._rate_checked = True
+            missed = len(self.located.left_out)
             for entry in self.located.add(piece, start, self.stream.windows.length):
                 self.poses += 1
                 self._print(json.dumps(entry, allow_nan=False), pose_line(entry))
-            if self.located.left_out and self.located.left_out[-1]["time"] > start:
-                self.reason = self.located.left_out[-1]["reason"]
-                _complain(f"no pose at t = {self.located.left_out[-1]['time']:.6g} s: {self.reason}")
+            for one in self.located.left_out[missed:]:
+                self.reason = one["reason"]
+                _complain(f"no pose at t = {one['time']:.6g} s: {self.reason}")
             if not self.keep:  # it may run for days
                 self.located.entries.clear()
                 self.located.left_out.clear()

@@ -5,23 +5,22 @@ from __future__ import annotations
 import math
 import re
 from argparse import Namespace
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from magfem.cli.console import listing, show_result, table
+from magfem.cli.console import show_result
+from magfem.cli.located import Located
 from magfem.cli.outputs import output_file
 from magfem.cli.parser import CommandLine
-from magfem.errors import ConvergenceError, InputError
-from magfem.units import format_quantity, quantity, quoted
+from magfem.cli.pose_text import poses_text
+from magfem.errors import InputError
+from magfem.units import quantity, quoted
 
 if TYPE_CHECKING:
-    from magfem.localization import Pose
     from magfem.localization.recorded import Setup
-    from magfem.samples.recording import Recording, Windows
+    from magfem.samples.recording import Windows
 
 LIVE_WINDOW = 2.0  # s
-_MOST_ROWS = 40  # of poses on a terminal
 
 
 def add(commands: CommandLine) -> None:
@@ -114,20 +113,18 @@ def run(options: Namespace) -> int:
     for name in recording.sensors:
         setup.sensor(name)
     setup.check_rate(recording)
-    first, last = float(recording.times[0]), float(recording.times[-1])
-    if windows is None:
-        pieces, length = [(first, recording)], last - first
-    else:
-        pieces, length = windows.within(recording), windows.length
     located = Located(setup, near)
-    if options.track:
-        assert windows is not None  # refused above
+    if windows is None:
+        first, last = float(recording.times[0]), float(recording.times[-1])
+        located.add(recording, first, last - first, fatal=True)
+    elif options.track:
         located.track(recording, windows)
         if picture:
-            located.last = Located(setup, [located.entries[-1]["position"]]).poses(pieces[-1][1])[0]
+            located.look_again(recording)
     else:
+        pieces = windows.within(recording)
         for start, piece in pieces:
-            located.add(piece, start, length, fatal=len(pieces) == 1)
+            located.add(piece, start, windows.length, fatal=len(pieces) == 1)
         if not located.entries:
             raise InputError(f"no window gives a pose: {located.left_out[0]['reason']} [{options.samples}]")
     data = poses_to_dict(located.entries, options.model, recording.source, setup.sensors, located.left_out)
@@ -140,57 +137,9 @@ def run(options: Namespace) -> int:
         write_json(output, data)
     if picture and drawn is not None:
         write_bytes(picture, drawn)
-    show_result(options, _text(data, setup, recording, [one for one in (options.output, options.picture) if one]), data)
+    files = [one for one in (options.output, options.picture) if one]
+    show_result(options, poses_text(data, setup, recording, files), data)
     return 0
-
-
-class Located:
-    """Poses of one window after the other, as plain data; what gave none with the reason.
-
-    With a prior, every window takes the branch nearest to the pose before it.
-    """
-
-    def __init__(self, setup: Setup, near: Sequence[Any] | None) -> None:
-        self.setup, self.near = setup, near
-        self.entries: list[dict[str, Any]] = []
-        self.left_out: list[dict[str, Any]] = []
-        self.last: tuple[Pose, ...] = ()
-
-    def add(self, piece: Recording, start: float, length: float, fatal: bool = False) -> list[dict[str, Any]]:
-        """The poses of a window, one for every motor; none when it gives none, or the error itself if `fatal`."""
-        from magfem.localization.poses_file import pose_to_dict
-
-        time = start + length / 2
-        try:
-            poses, names = self.poses(piece)
-        except (InputError, ConvergenceError) as error:
-            if fatal:
-                raise
-            self.left_out.append({"time": time, "reason": str(error)})
-            return []
-        found = [pose_to_dict(pose, time, (start, start + length), names) for pose in poses]
-        self.entries += found
-        self.last = poses
-        if self.near is not None:
-            self.near = poses
-        return found
-
-    def poses(self, piece: Recording) -> tuple[tuple[Pose, ...], tuple[str, ...]]:
-        """The poses of a window, and the names of the sensors that took part. Raises InputError, ConvergenceError."""
-        from magfem.localization.recorded import localize_recording
-
-        return localize_recording(piece, self.setup, self.near)
-
-    def track(self, recording: Recording, windows: Windows) -> None:
-        """All windows of a recording as one track. Raises InputError, ConvergenceError."""
-        from magfem.localization.poses_file import track_to_dicts
-        from magfem.localization.recorded import track_recording
-
-        length = windows.length
-        near = self.near[0] if self.near else None
-        found, starts, missed, names = track_recording(recording, self.setup, length, windows.step, near)
-        self.entries = track_to_dicts(found, starts, length, names)
-        self.left_out = [{"time": start + length / 2, "reason": "too few samples"} for start in missed.tolist()]
 
 
 def stated_setup(options: Namespace) -> tuple[Setup, list[Any] | None]:
@@ -234,93 +183,6 @@ def stated_windows(options: Namespace) -> Windows:
 
     length = LIVE_WINDOW if options.window is None else _positive(options.window, "time", "--window")
     return Windows(length, length if options.step is None else _positive(options.step, "time", "--step"))
-
-
-def pose_line(entry: dict[str, Any]) -> str:
-    """One pose in one line, for people."""
-    x, y, z = (f"{1e3 * value:.2f}" for value in entry["position"])
-    axis = ", ".join(f"{value:.3f}" for value in entry["axis"])
-    text = (
-        f"t = {entry['time']:.6g} s: position ({x}, {y}, {z}) mm ± {_millimetres(entry['position_deviation'])} mm, "
-        f"axis ({axis}) ± {_degrees(entry['axis_deviation'])} deg, {entry['frequency']:.6g} Hz"
-    )
-    others = len(entry["branches"]) - 1
-    return f"{text}, one of {others + 1} branches" if entry["ambiguous"] and others else text
-
-
-def _text(data: dict[str, Any], setup: Setup, recording: Recording, files: Sequence[str]) -> str:
-    entries = data["poses"]
-    sensors = len(recording.sensors)
-    rows = [
-        ("samples", f"{len(recording.times)} of {sensors} sensor{'s' * (sensors > 1)}{_rate(recording)}"),
-        ("moment", f"{format_quantity(setup.rotor.moment, 'moment')} across the axis"),
-        ("seen from", "the sensor" if list(setup.sensors) == [""] else "the frame of the sensors' card"),
-    ]
-    poses: list[tuple[str, ...]] = [
-        ("time", "frequency", "x (mm)", "y", "z", "±", "axis", "± (deg)", "phase", "field", "SNR")
-    ]
-    poses += [_row(entry) for entry in entries[:_MOST_ROWS]]
-    text = f"{data['model']} turns\n{listing(rows)}\n\n{table(poses)}"
-    if len(entries) > _MOST_ROWS:
-        text += f"\n  and {len(entries) - _MOST_ROWS} more"
-    if len(entries) == 1 and len(entries[0]["branches"]) > 1:
-        branches: list[tuple[str, ...]] = [("branches", "x (mm)", "y", "z", "axis", "phase", "log likelihood less")]
-        best = entries[0]["log_likelihood"]
-        for number, one in enumerate(entries[0]["branches"], 1):
-            less = "" if one["log_likelihood"] is None else f"{max(best - one['log_likelihood'], 0.0):.1f}"
-            branches.append((str(number), *_position_cells(one), _axis_cell(one), _phase_cell(one), less))
-        text += f"\n\n{table(branches)}"
-    notes = [f"{words}{_count(entries, words)}" for words in dict.fromkeys(w for e in entries for w in e["warnings"])]
-    notes += [f"no pose at t = {one['time']:.6g} s: {one['reason']}" for one in data["left_out"]]
-    if files:
-        notes.append(f"all of it in {' and '.join(files)}")
-    return text + "".join(f"\n  {note}" for note in notes)
-
-
-def _row(entry: dict[str, Any]) -> tuple[str, ...]:
-    snr = entry["signal_to_noise"]
-    return (
-        f"{entry['time']:.6g} s",
-        f"{entry['frequency']:.6g} Hz",
-        *_position_cells(entry),
-        _millimetres(entry["position_deviation"]),
-        _axis_cell(entry),
-        _degrees(entry["axis_deviation"]),
-        _phase_cell(entry),
-        format_quantity(float(f"{entry['strength']:.3g}"), "flux density"),
-        "" if snr is None else f"{snr:.1f} dB",
-    )
-
-
-def _position_cells(one: dict[str, Any]) -> tuple[str, str, str]:
-    x, y, z = (f"{1e3 * value:.3f}" for value in one["position"])
-    return x, y, z
-
-
-def _axis_cell(one: dict[str, Any]) -> str:
-    return f"({', '.join(f'{value:.4f}' for value in one['axis'])})"
-
-
-def _phase_cell(one: dict[str, Any]) -> str:
-    return f"{math.degrees(one['phase']):.2f} deg"
-
-
-def _millimetres(deviation: float | None) -> str:
-    return "?" if deviation is None else f"{1e3 * deviation:.2g}"
-
-
-def _degrees(deviation: float | None) -> str:
-    """An axis that may as well point anywhere has no deviation."""
-    return "?" if deviation is None or deviation > math.pi / 2 else f"{math.degrees(deviation):.2g}"
-
-
-def _rate(recording: Recording) -> str:
-    return f", {1 / recording.interval:.4g} Hz" if recording.interval else ""
-
-
-def _count(entries: Sequence[dict[str, Any]], words: str) -> str:
-    count = sum(words in entry["warnings"] for entry in entries)
-    return f" ({count} of {len(entries)} poses)" if len(entries) > 1 else ""
 
 
 def _positive(text: str, dimension: str, option: str) -> float:

@@ -131,7 +131,7 @@ def test_columns_without_a_header_in_any_delimiter(feed: Feed) -> None:
 
 
 def test_a_clock_set_back_begins_anew(feed: Feed) -> None:
-    code, out, err = feed(joined([*lines(T[:90] + 1000.0), *lines(T[:90])]), "--json", "-q")
+    code, out, err = feed(joined([*lines(T[:90] + 1000.0), *lines(T[:90])]), "--json", "-q", "-o", "p.json")
     assert code == 0 and [pose["time"] for pose in objects(out)] == pytest.approx([1001.0, 1003.0, 1.0, 3.0])
     assert err == "magfem: the time went back, windows begin anew [standard input: line 92]\n"
 
