@@ -176,18 +176,32 @@ def _predicted(belief: Belief, pose: Pose, time: float, noise: ProcessNoise) -> 
 
 def _explained(seen: Windows, prior: _Prior, pose: Pose, time: float) -> Belief:
     p, R = prior.position, prior.frame
-    weight = np.ones(len(p))
     limit = float(chi2.isf(FAULTY, 6 * len(seen.array.sensors) - 1))
+    inverse = np.linalg.inv(prior.covariance[:, :6, :6])
+    weight, share = np.ones(len(p)), np.ones(len(p))
+    cost = np.full(len(p), np.inf)
+    last_p, last_R = p, R
     for iteration in range(MOST_ITERATIONS):
+        # A step that made it worse, samples and prior together, is taken back, and half of it tried.
+        off = np.concatenate([p, R[:, :, 2]], axis=-1) - prior.state[:, :6]
+        now = weight * misfit(seen, p, R) + np.einsum("ni,nij,nj->n", off, inverse, off)
+        worse = now > cost + 1e-9 * np.abs(now)
+        p, R = np.where(worse[:, None], last_p, p), np.where(worse[:, None, None], last_R, R)
+        cost, share = np.where(worse, cost, now), np.where(worse, 0.5 * share, 1.0)
+        last_p, last_R = p, R
         said, phase = likelihoods(seen, p, R, weight)
         state, covariance, evidence = update(
             prior.state, prior.covariance, said.place, said.gradient, said.information, said.misfit
         )
-        p, R, changes = moved(seen, p, R, state, phase)
-        if iteration >= SETTLED:
-            weight = np.minimum(1.0, limit / np.maximum(misfit(seen, p, R), 1e-12))
+        towards = said.place + share[:, None] * (state[:, :6] - said.place)
+        p, R, changes = moved(seen, p, R, towards, phase)
         if changes.max() < SMALL_CHANGE and iteration > SETTLED:
             break
+        if iteration == SETTLED:
+            weight = np.minimum(1.0, limit / np.maximum(misfit(seen, last_p, last_R), 1e-12))
+            cost = np.full(len(p), np.inf)
+    # A window that is believed less has a covariance that is larger, and so a density that is lower.
+    evidence = evidence + 0.5 * 6 * len(seen.array.sensors) * np.log(weight)
     score = prior.log_weight + evidence
     order = np.argsort(-score, kind="stable")
     kept: list[int] = []

@@ -18,7 +18,7 @@ import numpy as np
 
 from magfem.typing import Floats
 
-DIFFUSE = np.repeat([0.2, 1.0, 0.05, 0.5], 3) ** 2
+DIFFUSE = np.repeat([0.2, 1.0, 0.02, 0.1], 3) ** 2
 """Variances of position (m²), axis, velocity (m²/s²) and rate (1/s²) before anything was measured."""
 
 

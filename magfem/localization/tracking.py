@@ -112,7 +112,7 @@ def track(
     middles = begin + float(np.mean(np.asarray(times, dtype=float)))
     with one_thread_for_algebra():
         seen = Windows(rotor, array, whitened(poses.fields, array))
-        found = [_follow(seen, middles, poses, path, noise) for path in _paths(poses, near)]
+        found = [_follow(seen, middles, poses, path, noise) for path in _paths(poses)]
     found = _distinct(sorted(found, key=lambda one: -one.log_evidence))
     if near is not None:
         where, likeliest = np.asarray(near, dtype=float), found[0].log_evidence
@@ -165,7 +165,7 @@ def _whole(samples: ArrayLike, begin: Floats) -> tuple[Floats, Floats]:
     return b[enough], begin[enough]
 
 
-def _paths(poses: Pose, near: ArrayLike | None) -> list[tuple[Points, Floats]]:
+def _paths(poses: Pose) -> list[tuple[Points, Floats]]:
     """Starts for the whole track: positions (w, 3) and frames (w, 3, 3), one for every branch of the surest window.
 
     Each is the shortest path through the branches of all windows that goes by that branch (Viterbi's algorithm): costs
@@ -176,8 +176,6 @@ def _paths(poses: Pose, near: ArrayLike | None) -> list[tuple[Points, Floats]]:
     phase = np.stack([one.phase for one in poses.branches], axis=1)
     cost = np.stack([poses.log_likelihood - one.log_likelihood for one in poses.branches], axis=1)  # (w, k)
     cost = np.minimum(cost, NEVER)
-    if near is not None:
-        cost[0] = cost[0] + 5 * np.linalg.norm(p[0] - np.asarray(near, dtype=float), axis=-1) / poses.distance[0]
     # However singular a window is, deviations of positions are at most the distance, of axes a radian.
     distance = np.linalg.norm(p, axis=-1)
     wide = np.stack([np.minimum(one.position_deviation, poses.distance) for one in poses.branches], axis=1)
