@@ -8,7 +8,7 @@ import sys
 import traceback
 from collections.abc import Sequence
 
-from magfem.cli import export, field, fit, listing, mesh, report, show, simulate, solve, validate
+from magfem.cli import export, field, fit, listing, localize, mesh, report, show, simulate, solve, validate
 from magfem.cli.console import progress
 from magfem.cli.parser import CommandLine
 from magfem.errors import MagfemError
@@ -21,7 +21,7 @@ INTERRUPTED, BROKEN_PIPE = 130, 141
 def command_line() -> CommandLine:
     """The parser with all commands, in the order in which help shows them."""
     commands = CommandLine()
-    for command in (listing, show, mesh, solve, fit, validate, field, export, report, simulate):
+    for command in (listing, show, mesh, solve, fit, validate, field, export, report, simulate, localize):
         command.add(commands)
     return commands
 

@@ -17,11 +17,12 @@ from magfem.units import DIMENSIONS, quantity, quoted, shortened
 
 FLUX_DENSITIES = ("flux density", "flux density per current")
 
-_EXAMPLES = {"length": "mm", "flux density": "mT", "current": "mA"}
+_EXAMPLES = {"length": "mm", "flux density": "mT", "current": "mA", "time": "ms"}
 _BRACKETS = re.compile(r"(.*?)\s*(?:\[([^\]]*)\]|\(([^)]*)\))")
 _ALIASES = {"x": ("x", "px"), "y": ("y", "py"), "z": ("z", "pz")}
 _CURRENT = re.compile(r"i(0|[1-9][0-9]*)")
 _OTHERS = ("sigma", "sx", "sy", "sz")
+_RECORDED = ("t", "sensor")  # of recordings alone
 
 
 class Named(Protocol):
@@ -56,21 +57,24 @@ class Column:
 
 
 def canonical(name: str) -> str | None:
-    """The name that magfem gives to a column it knows, or None: px is x, bx is Bx, I0 is i0."""
+    """The name that magfem gives to a column it knows, or None: px is x, bx is Bx, I0 is i0, time is t."""
     lower = name.lower()
+    if lower == "time":
+        return "t"
     for axis, aliases in _ALIASES.items():
         if lower in aliases:
             return axis
         if lower == f"b{axis}":
             return f"B{axis}"
-    return lower if lower in _OTHERS or _CURRENT.fullmatch(lower) else None
+    return lower if lower in (*_OTHERS, *_RECORDED) or _CURRENT.fullmatch(lower) else None
 
 
-def parse_columns(texts: Iterable[str]) -> dict[str, str]:
+def parse_columns(texts: Iterable[str], recorded: bool = False) -> dict[str, str]:
     """The mapping of columns that texts `NAME=COLUMN` state, as a command line has them.
 
-    `x=magnet_x_mm`, `x=-stage [mm]` (negated), `y==0 mm` (a constant). Raises InputError for texts of another form,
-    names that no samples have, and a name given twice.
+    `x=magnet_x_mm`, `x=-stage [mm]` (negated), `y==0 mm` (a constant). recorded: whether they are of a recording, with
+    t and sensor instead of points. Raises InputError for texts of another form, names that no such samples have, and a
+    name given twice.
     """
     columns: dict[str, str] = {}
     for text in texts:
@@ -79,22 +83,23 @@ def parse_columns(texts: Iterable[str]) -> dict[str, str]:
             raise InputError(
                 f"expected NAME=COLUMN, such as x=magnet_x_mm, or a constant, such as y==0 mm, got {quoted(text)}"
             )
-        known = _known(name)
+        known = _known(name, recorded)
         if known in columns:
             raise InputError(f"column {known} is given twice: as {quoted(columns[known])} and as {quoted(column)}")
         columns[known] = column
     return columns
 
 
-def check_columns(columns: Mapping[str, str] | None) -> dict[str, str]:
+def check_columns(columns: Mapping[str, str] | None, recorded: bool = False) -> dict[str, str]:
     """A mapping with canonical names; raises InputError for names that no samples have, or that are one."""
     checked: dict[str, str] = {}
     for name, column in (columns or {}).items():
         if not isinstance(name, str) or not isinstance(column, str):
             raise InputError('columns map names to texts, such as {"x": "magnet_x_mm"}')
-        if _known(name) in checked:
-            raise InputError(f"column {_known(name)} is given twice")
-        checked[_known(name)] = column
+        known = _known(name, recorded)
+        if known in checked:
+            raise InputError(f"column {known} is given twice")
+        checked[known] = column
     return checked
 
 
@@ -156,9 +161,11 @@ def split_unit(cell: str) -> tuple[str, str]:
     return match[1], (match[2] if match[2] is not None else match[3]).strip()
 
 
-def _known(name: str) -> str:
+def _known(name: str, recorded: bool) -> str:
     known = canonical(name)
-    if known is None:
+    if recorded and known not in (*_RECORDED, "Bx", "By", "Bz"):
+        raise InputError(f"recordings have no column {quoted(name)}: expected t, sensor, bx, by or bz")
+    if known is None or (known in _RECORDED and not recorded):
         raise InputError(
             f"samples have no column {quoted(name)}: expected x, y, z, Bx, By, Bz, sigma, sx, sy, sz, or i0, i1, ... "
             "for a coil system"
@@ -211,8 +218,9 @@ def _of_cell(named: Named, index: int, unit: str, sign: float, dimensions: Seque
 
 
 def _constant(name: str, text: str, dimensions: Sequence[str]) -> Column:
-    if name.startswith("B"):
-        raise InputError(f"column {name} cannot be a constant: B is what was measured, got {quoted('=' + text)}")
+    if name.startswith("B") or name in _RECORDED:
+        what = "B" if name.startswith("B") else name
+        raise InputError(f"column {name} cannot be a constant: {what} is what was measured, got {quoted('=' + text)}")
     dimension = next((kind for kind in dimensions if _is_quantity(text, kind)), dimensions[0])
     try:
         return Column(f"={text}", None, dimension, constant=quantity(text, dimension))

@@ -36,16 +36,21 @@ class Table:
     first_line: int
     delimiter: str | None
 
-    def numbers(self, columns: Sequence[int], gaps: Collection[int] = ()) -> Floats:
+    def numbers(self, columns: Sequence[int], gaps: Collection[int] = (), empty: bool = False) -> Floats:
         """The cells (n, len(columns)) of the columns with these indices; blank lines do not count.
 
-        gaps: the columns in which `nan` may stand, for what was not measured. Raises InputError that names file,
-        line and column for a cell that is no finite number, and for a row that is not as wide as the header.
+        gaps: the columns in which `nan` may stand, for what was not measured.  empty: whether an empty cell there says
+        the same. Raises InputError that names file, line and column for a cell that is no finite number, and for a row
+        that is not as wide as the header.
         """
-        values = self._fast(columns)
+        values = self._fast(columns) if len(self.lines) > 1 else None  # one line alone is read as fast carefully
         if values is None or not _allowed(values, columns, gaps):
-            values = self._careful(columns, gaps)
+            values = self._careful(columns, gaps, empty)
         return values
+
+    def words(self, column: int) -> list[str]:
+        """The cells (n) of a column as they are, without the space around them; blank lines do not count."""
+        return [row[column].strip() for _, row in self._rows()]
 
     def line(self, row: int) -> int:
         """The line of the file, from 1, on which row number `row`, from 0, ends."""
@@ -70,10 +75,12 @@ class Table:
             return values[:, list(columns)] if values.shape[1] == width else None
         return values
 
-    def _careful(self, columns: Sequence[int], gaps: Collection[int]) -> Floats:
+    def _careful(self, columns: Sequence[int], gaps: Collection[int], empty: bool) -> Floats:
         """Cell by cell, to name the one at fault."""
+        nothing = ("nan", "") if empty else ("nan",)
         values = [
-            [self._number(line, index, row[index], index in gaps) for index in columns] for line, row in self._rows()
+            [self._number(line, index, row[index], nothing if index in gaps else ()) for index in columns]
+            for line, row in self._rows()
         ]
         return np.array(values, dtype=float).reshape(-1, len(columns))
 
@@ -101,17 +108,17 @@ class Table:
             line = self.first_line + rows.line_num - 1
             raise InputError(f"not valid CSV: {error} [{self.path}: line {line}]") from None
 
-    def _number(self, line: int, column: int, cell: str, gap: bool) -> float:
+    def _number(self, line: int, column: int, cell: str, nothing: Collection[str]) -> float:
         try:
             value = math.nan if "_" in cell else float(cell)  # Python takes 1_000 for a number
         except ValueError:
             value = math.nan
-        if math.isfinite(value) or (gap and cell.strip().lower() == "nan"):
+        if math.isfinite(value) or cell.strip().lower() in nothing:
             return value
         if _DECIMAL_COMMA.fullmatch(cell.strip()):
             expected = "expected a number with a decimal point"
         else:
-            expected = "expected a finite number" + (", or nan where nothing was measured" if gap else "")
+            expected = "expected a finite number" + (", or nan where nothing was measured" if nothing else "")
         where = f"[{self.path}: line {line}, column {self.header[column]}]"
         raise InputError(f"{expected}, got {quoted(cell)} {where}")
 
