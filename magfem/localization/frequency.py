@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from magfem.errors import InputError
-from magfem.typing import ArrayLike, Booleans, Floats
+from magfem.typing import ArrayLike, Booleans, Complexes, Floats
 
 _PER_LINE = 4  # points of the spectrum per 1/(time sampled): a peak is met within an eighth of its width
 _MOST_STEPS = 30
+_MOST_DRIFTS = 80  # either way, half a turn at the ends of the record from one to the next
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +68,7 @@ def spectrum(
         )
     used = np.isfinite(b)
     lines = _lines(t, highest) if frequencies is None else np.asarray(frequencies, dtype=float)
-    return Spectrum(lines, _power(np.where(used, b, 0.0), t - t.mean(), used, lines))
+    return Spectrum(lines, _power(np.where(used, b, 0.0), used, _waves(lines, t - t.mean())))
 
 
 def find_frequency(
@@ -93,8 +94,7 @@ def find_frequency(
     middle, span = float(t.mean()), float(np.ptp(t))
     tau = t - middle
     weights = np.ones(columns) if weight is None else np.broadcast_to(np.asarray(weight, dtype=float), (columns,))
-    f = _start(b, t, used, near)
-    d: Floats = np.zeros(lead)
+    f, d = _start(b, t, used, near, drift)
     chosen = [0, 1] if drift else [0]
     for _ in range(_MOST_STEPS):
         information, gradient, misfit = _linearised(b, tau, used, f, d, weights)
@@ -118,15 +118,49 @@ def find_frequency(
     return Frequency(f, np.sqrt(variance), d, middle)
 
 
-def _start(b: Floats, t: Floats, used: Booleans, near: ArrayLike | None) -> Floats:
-    """(...) Hz, from where the frequency is refined."""
+def _start(b: Floats, t: Floats, used: Booleans, near: ArrayLike | None, drift: bool) -> tuple[Floats, Floats]:
+    """(...) Hz at the middle and (...) Hz/s, from where both are refined: the peak of the spectrum.
+
+    Where the frequency drifts, of the spectra of the samples with each of many drifts undone, up to twenty turns more
+    or less from the middle to the ends. Near a stated frequency, which is that at time zero, lines are tried that lead
+    back to it.
+    """
+    lead, middle, span = b.shape[:-2], float(t.mean()), float(np.ptp(t))
+    tau = t - middle
+    most = _MOST_DRIFTS if drift else 0
+    drifts: Floats = np.arange(-most, most + 1) * 2.0 / span**2
     if near is None:
         lines = _lines(t, None)
-        return np.array(lines[np.argmax(_power(b, t - t.mean(), used, lines), axis=-1)])
-    start = np.array(np.broadcast_to(np.asarray(near, dtype=float), b.shape[:-2]))
+        waves = _waves(lines, tau)
+        power = np.stack([_power(b, used, waves, chirp) for chirp in _chirps(tau, drifts)], axis=-2)
+        best = power.reshape(*lead, -1).argmax(axis=-1)  # of drifts × lines
+        return lines[best % lines.size], drifts[best // lines.size]
+    start = np.array(np.broadcast_to(np.asarray(near, dtype=float), lead))
     if not np.all(np.isfinite(start) & (start > 0)):
         raise InputError(f"a rotation frequency must be a positive number in Hz, got {near!r}")
-    return start
+    if not drift:
+        return start, np.zeros(lead)
+    about = np.arange(-_PER_LINE, _PER_LINE + 1) / (_PER_LINE * span)
+    lines = np.maximum(start[..., None, None] + middle * drifts[:, None] + about, 1e-3 / span)  # (..., drifts, f)
+    power = np.stack(
+        [_power(b, used, _waves(lines[..., k, :], tau), chirp) for k, chirp in enumerate(_chirps(tau, drifts))],
+        axis=-2,
+    )
+    best = power.reshape(*lead, -1).argmax(axis=-1)
+    return (
+        np.take_along_axis(lines.reshape(*lead, -1), best[..., None], axis=-1)[..., 0],
+        drifts[best // about.size],
+    )
+
+
+def _waves(lines: Floats, tau: Floats) -> Complexes:
+    """(..., f, n) of lines (..., f) Hz."""
+    return np.asarray(np.exp(-2j * np.pi * lines[..., None] * tau))
+
+
+def _chirps(tau: Floats, drifts: Floats) -> Complexes:
+    """(d, n): multiplied with samples they undo each of the drifts."""
+    return np.asarray(np.exp(-1j * np.pi * drifts[:, None] * tau**2))
 
 
 def _lines(t: Floats, highest: float | None) -> Floats:
@@ -139,13 +173,11 @@ def _lines(t: Floats, highest: float | None) -> Floats:
     return lines
 
 
-def _power(b: Floats, tau: Floats, used: Booleans, lines: Floats) -> Floats:
-    """(..., f) T²: what the best sinusoid at each line takes off the mean square, summed over axes."""
+def _power(b: Floats, used: Booleans, waves: Complexes, chirp: Complexes | None = None) -> Floats:
+    """(..., f) T²: what the best of each of `waves` (..., f, n) takes off the mean square, summed over axes."""
     count = np.maximum(used.sum(axis=-2, keepdims=True), 1)
     centred = np.where(used, b - b.sum(axis=-2, keepdims=True) / count, 0.0)
-    angle = 2 * np.pi * lines[:, None] * tau
-    waves = np.exp(-1j * angle)  # (f, n)
-    amplitude = waves @ centred  # (..., f, 3)
+    amplitude = waves @ (centred if chirp is None else centred * chirp[:, None])  # (..., f, c)
     power: Floats = 2 * np.sum(np.abs(amplitude) ** 2 / count**2, axis=-1)
     return power
 

@@ -17,7 +17,7 @@ from magfem.errors import InputError
 from magfem.localization.frequency import Frequency, find_frequency
 from magfem.typing import ArrayLike, Booleans, Floats, Integers, Vectors
 
-LARGEST_CONDITION = 30.0
+LARGEST_CONDITION = 10.0
 """Of the scaled design: beyond, what is called one frequency could as well be another, or the static field."""
 
 
@@ -208,7 +208,7 @@ def _fit(
     left = np.where(missing, 0.0, b - X @ coefficients)
     residual = np.sqrt(np.sum(left**2, axis=-2) / (count - k))
     # Samples without any noise: what rounding of numbers leaves keeps weights finite.
-    least = 1e-15 * np.abs(b).max(axis=(-2, -1))[..., None]
+    least = 1e-10 * np.abs(b).max(axis=(-2, -1))[..., None]
     noise = np.maximum(residual if sigma is None else np.broadcast_to(sigma, residual.shape), least)
     if sigma is None:
         # The coefficients' posterior is Student's t with ν = n − k degrees of freedom, its covariance ν/(ν − 2) larger.
