@@ -128,7 +128,7 @@ def _start(b: Floats, t: Floats, used: Booleans, near: ArrayLike | None, drift: 
     lead, middle, span = b.shape[:-2], float(t.mean()), float(np.ptp(t))
     tau = t - middle
     most = _MOST_DRIFTS if drift else 0
-    drifts: Floats = np.arange(-most, most + 1) * 2.0 / span**2
+    drifts = np.asarray(np.arange(-most, most + 1) * 2.0 / span**2, dtype=np.float64)
     if near is None:
         lines = _lines(t, None)
         waves = _waves(lines, tau)
