@@ -1,5 +1,6 @@
 """Localization: where a magnet is that turns about an axis, from the field that it makes at one sensor or more."""
 
+from magfem.localization.bounds import PoseBound, pose_bound
 from magfem.localization.dipole_pose import DipolePoses, dipole_poses
 from magfem.localization.following import Belief, follow
 from magfem.localization.frequency import Frequency, Spectrum, find_frequency, spectrum
@@ -18,6 +19,7 @@ __all__ = [
     "DipolePoses",
     "Frequency",
     "Pose",
+    "PoseBound",
     "ProcessNoise",
     "RotatingField",
     "Rotor",
@@ -33,6 +35,7 @@ __all__ = [
     "localize",
     "localize_several",
     "locate_field",
+    "pose_bound",
     "simulated_samples",
     "spectrum",
     "track",

@@ -122,6 +122,19 @@ def demodulate_several(
     return tuple(_rotating(fitted, j, _constant(f, b.shape[:-2], float(t.mean()))) for j, f in enumerate(given))
 
 
+def quadrature_covariance(times: ArrayLike, frequency: float, *, noise: ArrayLike, resolution: float = 0.0) -> Floats:
+    """(6, 6) T² of (C, S) from samples at `times` (n,) s with this noise, as `demodulate` states it; see there.
+
+    For whole turns, evenly sampled, 2 σ²/n on the diagonal.
+    """
+    t = np.asarray(times, dtype=float)
+    sigma = _stated_noise(noise, resolution)
+    X = _design([_constant(frequency, (), float(t.mean())).turns(t)])
+    normal = X.T @ X
+    _separable(normal, None)
+    return np.asarray(np.kron(np.linalg.inv(normal)[1:, 1:], np.diag(sigma**2)))
+
+
 @dataclass(frozen=True, eq=False)
 class _Fitted:
     """coefficients (..., k, 3), the matrices (..., 3, k, k) that noise variances multiply, noise, residual, counts."""
