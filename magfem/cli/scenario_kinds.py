@@ -12,7 +12,7 @@ from magfem.geometry.card import Table, read_table
 from magfem.geometry.catalogue import resolve, short_path
 from magfem.units import describe
 
-KINDS = ("scenario", "localization_study")
+KINDS = ("scenario", "localize_and_steer", "localization_study")
 
 
 @dataclass(frozen=True)
@@ -53,6 +53,18 @@ def kind_of(recipe: Table) -> Kind:
             run_folder.write_run,
             summary,
             steering_text.text,
+        )
+    if kind == "localize_and_steer":
+        from magfem.cli import closed_system_text
+        from magfem.report import closed_system_folder
+        from magfem.scenario.closed_system import ClosedRun, read_closed_system, simulate_closed_system
+
+        return Kind(
+            closed_system_folder.FILES,
+            lambda table: simulate_closed_system(read_closed_system(table)),
+            closed_system_folder.write_closed_run,
+            ClosedRun.summary,
+            closed_system_text.text,
         )
     if kind == "localization_study":
         from magfem.cli import study_text

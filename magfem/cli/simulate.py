@@ -16,14 +16,16 @@ def add(commands: CommandLine) -> None:
         run,
         "scenarios: rods steered by coils, magnets localized",
         'Runs a scenario. Of kind "scenario": a rod with magnets in a coil system, a plant that is not quite the\n'
-        'controller\'s model, its sensing, and where the magnets shall point. Of kind "localization_study": how well\n'
-        "turning magnets are localized, beside what is published. The folder DIR gets summary.json, data, pictures\n"
+        'controller\'s model, its sensing, and where the magnets shall point. Of kind "localize_and_steer": a motor\n'
+        'in tubes, localized and steered by one arm. Of kind "localization_study": how well turning magnets are\n'
+        "localized, beside what is published. The folder DIR gets summary.json, data, pictures\n"
         "and report.html, all of them or none. A scenario is a name that `magfem list` shows or the path of a recipe\n"
         "(TOML). Exit code 1 when it did not end as its recipe says: a target that was not reached, a limit that was\n"
         "not kept.",
         [
             "magfem simulate steer_planar -o steering",
             "magfem simulate steer_own_coils -o steering --json",
+            "magfem simulate localize_and_steer -o motor",
             "magfem simulate localize_tracks -o tracks",
             "magfem simulate ./mine.toml -o mine --no-pictures",
         ],
