@@ -23,9 +23,10 @@ def text(data: dict[str, Any], folder: str) -> str:
         )
     reached = sum(one["reached"] for one in data["targets"])
     found = data["localization"]
+    off, turned = found["position_error_mm"]["rms"], found["axis_error_deg"]["rms"]
     return (
         f"{data['name']}\n{table(rows)}\n"
         f"  {reached} of {len(data['targets'])} targets reached, {data['distance_mm']:.0f} mm in "
-        f"{data['duration_s']:.0f} s; {found['count']} localizations, RMS errors {found['position_error_mm']['rms']:.2g} mm and "
-        f"{found['axis_error_deg']['rms']:.2g} deg\n  all of it in {folder}"
+        f"{data['duration_s']:.0f} s; {found['count']} localizations, RMS errors {off:.2g} mm and {turned:.2g} deg\n"
+        f"  all of it in {folder}"
     )

@@ -1,6 +1,7 @@
 """Localization: where a magnet is that turns about an axis, from the field that it makes at one sensor or more."""
 
 from magfem.localization.bounds import PoseBound, pose_bound
+from magfem.localization.design import Placement, Workspace, needed_noise, place_sensors, reach, workspace
 from magfem.localization.dipole_pose import DipolePoses, dipole_poses
 from magfem.localization.following import Belief, follow
 from magfem.localization.frequency import Frequency, Spectrum, find_frequency, spectrum
@@ -18,6 +19,7 @@ __all__ = [
     "Branch",
     "DipolePoses",
     "Frequency",
+    "Placement",
     "Pose",
     "PoseBound",
     "ProcessNoise",
@@ -26,6 +28,7 @@ __all__ = [
     "Sensor",
     "Spectrum",
     "Track",
+    "Workspace",
     "as_rotor",
     "demodulate",
     "demodulate_several",
@@ -35,9 +38,13 @@ __all__ = [
     "localize",
     "localize_several",
     "locate_field",
+    "needed_noise",
+    "place_sensors",
     "pose_bound",
+    "reach",
     "simulated_samples",
     "spectrum",
     "track",
     "windows",
+    "workspace",
 ]

@@ -90,7 +90,7 @@ def pose_bound(
     p, a = np.broadcast_arrays(np.asarray(position, dtype=float), np.asarray(axis, dtype=float))
     if p.shape[-1:] != (3,):
         raise InputError(f"positions and axes must be (..., 3), got {np.shape(position)} and {np.shape(axis)}")
-    said = information(rotor, array, p, orientation(a, np.zeros(p.shape[:-1])), _whitening(array, times, frequency))
+    said = information(rotor, array, p, orientation(a, np.zeros(p.shape[:-1])), whitening(array, times, frequency))
     size = np.sqrt(np.maximum(np.einsum("...ii->...i", said), np.finfo(float).tiny))
     scaled = said / (size[..., :, None] * size[..., None, :])
     values, vectors = np.linalg.eigh(scaled)
@@ -102,7 +102,7 @@ def pose_bound(
     return PoseBound(array.positions.mean(axis=0), p, covariance, singular)
 
 
-def _whitening(array: SensorArray, times: ArrayLike, frequency: float) -> Floats:
+def whitening(array: SensorArray, times: ArrayLike, frequency: float) -> Floats:
     """(s, 6, 6) of the true field's quadratures, in the sensors' frames."""
     found = []
     for one in array.sensors:

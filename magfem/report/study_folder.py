@@ -22,7 +22,7 @@ _PICTURES = (
     *("isoline_errors", "range", "track_cubic", "track_helical", "track_sinusoidal"),
     *(f"track_random_{k}" for k in range(1, _MOST_RANDOM_PATHS + 1)),
     *("isoline_positions", "isoline_angles", "isoline_sensitivity", "axis_bias", "sensor_noise", "stator_field"),
-    "stator_bias",
+    *("stator_bias", "workspaces", "placed"),
 )
 FILES = frozenset(["summary.json", "data.npz", "recipe.toml", "report.html"] + [f"{name}.png" for name in _PICTURES])
 """All that the folder may hold."""

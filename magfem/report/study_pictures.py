@@ -7,10 +7,12 @@ from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
+from matplotlib.colors import LogNorm
 
 from magfem.report import isoline_pictures, stator_pictures
 from magfem.report.figures.style import (
     BLUE,
+    ERROR,
     GREEN,
     GREY,
     INK,
@@ -29,6 +31,7 @@ from magfem.scenario.localization_study.isolines import IsolineErrors
 from magfem.scenario.localization_study.range_study import REACH, RangeErrors
 from magfem.scenario.localization_study.stator import StatorResult
 from magfem.scenario.localization_study.tracks import PathResult, Tracks
+from magfem.scenario.localization_study.workspace import WorkspaceMaps
 from magfem.typing import Floats
 
 MILLI, MICRO, NANO, DEGREE = 1e3, 1e6, 1e9, 180 / np.pi
@@ -44,6 +47,7 @@ def draw(study: Study) -> list[Picture]:
         "tracks": tracks,
         "curves": curves,
         "stator": stator,
+        "workspace": workspaces,
     }
     return drawers[study.kind](study.result)
 
@@ -150,7 +154,8 @@ def _path(found: Tracks, one: PathResult) -> Picture:
         drawn = figure(6.6, _WIDE)
         halves: Any = drawn.subfigures(2, 1, height_ratios=[1.25, 1.0])
         views = halves[0].subplots(1, 2)
-        reach = 1.35 * MILLI * np.abs(one.position).max()
+        reach = 8 + MILLI * max(np.abs(one.position[:, :2]).max(), found.study.spacing / 2)
+        top = 6 + MILLI * one.position[:, 2].max()
         for axes, (i, j), labels in zip(views, ((0, 2), (0, 1)), (("x", "z"), ("x", "y")), strict=True):
             axes.plot(MILLI * one.position[:, i], MILLI * one.position[:, j], color=INK, linewidth=2.5, alpha=0.25)
             for name, method, colour in methods:
@@ -164,8 +169,7 @@ def _path(found: Tracks, one: PathResult) -> Picture:
             for sensor in found.study.sensors:
                 at = MILLI * sensor.pose.translation
                 axes.plot(at[i], at[j], "s", color=GREEN, markersize=5)
-            low = -reach if labels[1] == "y" else -0.25 * reach
-            axes.set(xlim=(-reach, reach), ylim=(low, low + 2 * reach if labels[1] == "y" else reach), aspect="equal")
+            axes.set(xlim=(-reach, reach), ylim=(-reach, reach) if labels[1] == "y" else (-4, top), aspect="equal")
             axes.set(xlabel=f"{labels[0]} (mm)", ylabel=f"{labels[1]} (mm)")
             grid(axes)
         errors = halves[1].subplots(1, 2)
@@ -236,6 +240,84 @@ def stator(found: StatorResult) -> list[Picture]:
         "µT (Fig. S6.6a).",
     )
     return [noise, *stator_pictures.draw(found.influence)]
+
+
+def workspaces(found: WorkspaceMaps) -> list[Picture]:
+    """Maps of the bound of position and axis, arrangement by arrangement; and the best places."""
+    study = found.study
+    count = len(found.maps)
+    rows = (
+        ("position", MILLI, "position (mm)", np.array([0.1, 0.2, 0.5, 1, 2, 5, 10, 20]), MILLI * study.position),
+        ("axis", DEGREE, "axis (deg)", np.array([0.5, 1, 2, 5, 10, 20, 40, 80]), DEGREE * study.axis),
+    )
+    with drawing():
+        drawn = figure(5.0, _WIDE)
+        panels = drawn.subplots(2, count, sharex=True, sharey=True, squeeze=False)
+        for (name, scale, label, levels, limit), line in zip(rows, panels, strict=True):
+            for one, spacing, axes in zip(found.maps, study.spacings, line, strict=True):
+                values = np.clip(scale * getattr(one, name), levels[0], levels[-1]).T
+                filled = axes.contourf(
+                    MILLI * found.x,
+                    MILLI * found.z,
+                    values,
+                    levels=levels,
+                    norm=LogNorm(levels[0], levels[-1]),
+                    cmap=ERROR,
+                )
+                axes.contour(MILLI * found.x, MILLI * found.z, values, levels=[limit], colors="white", linewidths=1.6)
+                if spacing > 0:
+                    unsafe = one.wrong_branch.T
+                    axes.contour(
+                        *(MILLI * found.x, MILLI * found.z, unsafe),
+                        levels=[0.005],
+                        colors=[ORANGE],
+                        linewidths=1.2,
+                        linestyles="--",
+                    )
+                at = MILLI * np.array([0.0] if spacing == 0 else [-spacing / 2, spacing / 2])
+                axes.plot(at, 0 * at, "s", color=GREEN, markersize=5, clip_on=False)
+                axes.set(aspect="equal", ylim=(0, None))
+            line[0].set_ylabel("z (mm)")
+            bar = drawn.colorbar(filled, ax=line.tolist(), label=f"bound of the {label}", shrink=0.95)
+            bar.set_ticks(levels.tolist(), labels=[f"{one:g}" for one in levels])
+            bar.minorticks_off()
+        for axes, spacing in zip(panels[0], study.spacings, strict=True):
+            axes.set_title("one sensor" if spacing == 0 else f"two, {MILLI * spacing:.3g} mm apart")
+        for axes in panels[1]:
+            axes.set_xlabel("x (mm)")
+        content = png(drawn)
+    maps = Picture(
+        "workspaces",
+        content,
+        "Maps of the bounds of position and axis about one sensor and about pairs of sensors.",
+        f"Cramér–Rao bound about sensors (squares) of {study.noise.deviation * MICRO:.3g} µT with {study.duration:g} s "
+        f"at {study.rate:g} Hz, root mean squares over all directions of the rotor’s axis. White: the limits of "
+        f"{MILLI * study.position:g} mm and {DEGREE * study.axis:g}°. Beyond the dashed line a wrong branch is likelier "
+        "than once in 200; with one sensor the branch must be known.",
+    )
+    return [maps, _placed(found)]
+
+
+def _placed(found: WorkspaceMaps) -> Picture:
+    half = MILLI * found.study.plate / 2
+    at = MILLI * np.array([one.pose.translation for one in found.placed])
+    line = np.linspace(-half, half, found.study.placed)
+    with drawing():
+        drawn = figure(3.4, 3.6)
+        axes = drawn.subplots()
+        axes.plot([-half, half, half, -half, -half], [-half, -half, half, half, -half], color=GREY, linewidth=0.8)
+        axes.plot(line, 0 * line, "s", color=GREY, markersize=5, label=f"in a line: {MILLI * found.line_bound:.2f} mm")
+        axes.plot(at[:, 0], at[:, 1], "s", color=GREEN, label=f"placed best: {MILLI * found.placed_bound:.2f} mm")
+        axes.set(aspect="equal", xlabel="x (mm)", ylabel="y (mm)")
+        drawn.legend(*axes.get_legend_handles_labels(), loc="outside lower center")
+        content = png(drawn)
+    return Picture(
+        "placed",
+        content,
+        "Places of sensors on a plate: in a line, and those with the least bound.",
+        f"{found.study.placed} sensors on a plate, in a line and where the bound of the position is least for a rotor "
+        "anywhere in the middle of the map.",
+    )
 
 
 def _colours(count: int) -> Sequence[Any]:

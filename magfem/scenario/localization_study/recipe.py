@@ -1,7 +1,7 @@
 """Recipes of studies: TOML files of kind "localization_study" in `reports/`, or anywhere.
 
 kind = "localization_study"
-study = "isolines"                # or "range", "tracks", "curves", "stator": a module of this package each
+study = "isolines"                # or "range", "tracks", "curves", "stator", "workspace": a module of this package each
 name = "…"
 source = "…"
 …                                 # what the study asks for: see its module's `read`
@@ -14,7 +14,7 @@ from types import ModuleType
 
 from magfem.geometry.card import Table, read_table
 from magfem.geometry.catalogue import resolve, short_path
-from magfem.scenario.localization_study import curves, isolines, range_study, stator, tracks
+from magfem.scenario.localization_study import curves, isolines, range_study, stator, tracks, workspace
 from magfem.scenario.localization_study.study import Study
 from magfem.threads import one_thread_for_algebra
 from magfem.units import describe
@@ -26,6 +26,7 @@ STUDIES: dict[str, ModuleType] = {
     "tracks": tracks,
     "curves": curves,
     "stator": stator,
+    "workspace": workspace,
 }
 """Each with `read` (recipe to settings), `run` (settings to result), `compared` and `arrays` (of the result)."""
 
