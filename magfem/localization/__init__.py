@@ -1,6 +1,13 @@
 """Localization: where a magnet is that turns about an axis, from the field that it makes at one sensor or more."""
 
 from magfem.localization.bounds import PoseBound, pose_bound
+from magfem.localization.calibration import (
+    Calibration,
+    CalibrationBound,
+    SensorDeviation,
+    calibrate,
+    calibration_bound,
+)
 from magfem.localization.dipole_pose import DipolePoses, dipole_poses
 from magfem.localization.following import Belief, follow
 from magfem.localization.frequency import Frequency, Spectrum, find_frequency, spectrum
@@ -16,6 +23,8 @@ from magfem.localization.tracking import Track, track, windows
 __all__ = [
     "Belief",
     "Branch",
+    "Calibration",
+    "CalibrationBound",
     "DipolePoses",
     "Frequency",
     "Pose",
@@ -24,9 +33,12 @@ __all__ = [
     "RotatingField",
     "Rotor",
     "Sensor",
+    "SensorDeviation",
     "Spectrum",
     "Track",
     "as_rotor",
+    "calibrate",
+    "calibration_bound",
     "demodulate",
     "demodulate_several",
     "dipole_poses",
