@@ -39,12 +39,12 @@ from magfem.localization.rotor import Model, Rotor, as_rotor
 from magfem.localization.sensor import Sensor, SensorArray, Sensors, as_sensors, is_one
 from magfem.localization.signal import demodulate
 from magfem.threads import one_thread_for_algebra
-from magfem.typing import ArrayLike, Booleans, Floats, Points, Vectors
+from magfem.typing import ArrayLike, Floats, Points, Vectors
 
 FIND = ("gain", "rotation", "position", "offset")
 FEWEST_SAMPLES = 6
 WORSE = 1.5
-"""Residuals of this many deviations are not noise alone: known poses or the rotor's model are less good than samples."""
+"""Residuals of this many deviations are not noise alone: known poses or the rotor's model are less good than that."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,8 +104,8 @@ class Calibration:
             said.append("the calibration did not converge")
         if self.residual > WORSE:
             said.append(
-                f"residuals are {self.residual:.3g} times what the samples' noise explains: the known poses or the rotor's "
-                "model are not that good, and deviations are at least as much larger"
+                f"residuals are {self.residual:.3g} times what the samples' noise explains: the known poses or the "
+                "rotor's model are not that good, and deviations are at least as much larger"
             )
         if (left_out := int(np.isnan(self.misfit).sum())) > 0:
             said.append(f"{left_out} of {self.misfit.size} sets of samples were too few or saturated, and left out")
@@ -151,8 +151,8 @@ def calibrate(
     a third of the distance to the rotor.  frequency: Hz.
     phase: rad, at time zero, as in `Pose`; (k,) or one number; None where each pose has one of its own, unknown.
     static: (3,) T, the field of everything but the rotor, in the common frame; None to find it.
-    sensor_poses: k poses of the carrier that the sensors are mounted on, in the common frame; the poses of `sensors` are
-    then in the carrier's frame.
+    sensor_poses: k poses of the carrier that the sensors are mounted on, in the common frame; the poses of `sensors`
+    are then in the carrier's frame.
     find: what is not known, out of "gain", "rotation", "position", "offset" (of every sensor), "moment" (of the rotor),
     "rotor" (position and axis of one at rest; where it is about must be given) and "phase" (a number to be added to all
     stated phases). Static readings are used where offsets are found, and only there.
@@ -205,7 +205,12 @@ def calibration_bound(
     for one in array.sensors:
         if one.noise is None or not np.all(np.asarray(one.noise) > 0):
             raise InputError("a bound needs sensors whose noise is stated: Sensor(noise=3e-6)")
-    shapes = (np.shape(positions)[:-1], np.shape(axes)[:-1], np.shape(phase), _carried(sensor_poses))
+    shapes = (
+        np.shape(positions)[:-1],
+        np.shape(axes)[:-1],
+        () if phase is None else np.shape(phase),
+        _carried(sensor_poses),
+    )
     poses = max((shape[0] for shape in shapes if shape), default=1)
     layout, motion, at = _setting(rotor, array, poses, positions, axes, phase, static, sensor_poses, frozenset(find))
     with one_thread_for_algebra():

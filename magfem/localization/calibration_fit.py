@@ -60,8 +60,9 @@ def fit_unknowns(
     weight, cost = _weighed(residual, robust)
     x = motion.places[:, None] + np.einsum("kij,sj->ksi", motion.axes, at.place)
     longest = layout.longest(float(np.linalg.norm(x - at.rotor[:, None], axis=-1).min()))
-    converged, iteration = False, 0
-    for iteration in range(1, MOST_ITERATIONS + 1):
+    converged, iterations = False, 0
+    while iterations < MOST_ITERATIONS and damping < 1e12 and not converged:
+        iterations += 1
         rows = (np.sqrt(weight)[..., None, None] * J).reshape(-1, J.shape[-1])
         size = np.maximum(np.linalg.norm(rows, axis=0), np.finfo(float).tiny)
         rows = rows / size
@@ -84,13 +85,9 @@ def fit_unknowns(
             done, damping, growth = done and damping <= LIGHT, max(less, 1e-15), 2.0
         else:
             damping, growth = damping * growth, 2 * growth
-        if done:
-            converged = True
-            break
-        if damping > 1e12:
-            break
+        converged = done
     root = np.sqrt(weight)
-    return CalibrationFit(at, root[..., None] * residual, root[..., None, None] * J, weight, converged, iteration)
+    return CalibrationFit(at, root[..., None] * residual, root[..., None, None] * J, weight, converged, iterations)
 
 
 def whitened_jacobian(

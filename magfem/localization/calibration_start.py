@@ -28,7 +28,7 @@ def first_guess(rotor: Rotor, motion: Motion, at: Unknowns, layout: Layout, meas
     """
     plain = replace(at, matrix=np.broadcast_to(np.eye(3), at.matrix.shape), offset=np.zeros_like(at.offset))
     values, _ = readings(rotor, motion, plain, layout)
-    f, h = values[..., 3:6] - 1j * values[..., 6:], measured.values[..., 3:6] - 1j * measured.values[..., 6:]
+    f, h = _complex(values), _complex(measured.values)
     size = np.where(measured.used, np.linalg.norm(f, axis=-1), np.inf)[..., None]
     f, h = f / size, h / size
     open_phase = layout.each_phase or "phase" in layout.find
@@ -39,15 +39,20 @@ def first_guess(rotor: Rotor, motion: Motion, at: Unknowns, layout: Layout, meas
         )
     if not open_phase:
         return replace(at, matrix=matrices)
-    return replace(at, matrix=matrices, phase=at.phase + np.angle(_turned(f, h, matrices, layout)))
+    return replace(at, matrix=matrices, phase=at.phase + _phase(f, h, matrices, layout))
 
 
-def _turned(f: Complexes, h: Complexes, matrices: Floats, layout: Layout) -> Complexes:
-    """exp(iφ) (k,) that turns fields (k, s, 3), read by matrices (s, 3, 3), best to what was read."""
+def _complex(values: Floats) -> Complexes:
+    """C − iS of readings (..., 9)."""
+    return np.asarray(values[..., 3:6] - 1j * values[..., 6:])
+
+
+def _phase(f: Complexes, h: Complexes, matrices: Floats, layout: Layout) -> Floats:
+    """φ (k,) rad that turns fields (k, s, 3), read by matrices (s, 3, 3), best to what was read."""
     likeness = np.einsum("sij,ksj,ksi->k", matrices, f.conj(), h)
     if not layout.each_phase:
         likeness = np.full(likeness.shape, likeness.sum())
-    return np.asarray(np.exp(1j * np.angle(likeness)))
+    return np.asarray(np.arctan2(likeness.imag, likeness.real))
 
 
 def _matrix(f: Complexes, h: Complexes, nominal: Floats, gain: Floats, layout: Layout, open_phase: bool) -> Floats:
@@ -58,8 +63,8 @@ def _matrix(f: Complexes, h: Complexes, nominal: Floats, gain: Floats, layout: L
     for mounting in mountings:
         matrix = nominal @ mounting
         for _ in range(ROUNDS if open_phase else 1):
-            turn = _turned(f[:, None], h[:, None], matrix[None], layout) if open_phase else np.ones(len(f))
-            turned = turn[:, None] * f
+            angle = _phase(f[:, None], h[:, None], matrix[None], layout) if open_phase else np.zeros(len(f))
+            turned = np.exp(1j * angle)[:, None] * f
             rows, read = np.concatenate([turned.real, turned.imag]), np.concatenate([h.real, h.imag])
             found, _, rank, values = np.linalg.lstsq(rows, read, rcond=None)
             if rank < 3 or values[-1] < 1e-3 * values[0]:

@@ -26,10 +26,11 @@ class RotatingField:
     """What the samples say of one rotation frequency, at one three-axis sensor or many.
 
     static, cosine, sine: (..., 3) T, of the field b₀ + C cos φ + S sin φ with φ = 2π(f t + ½ d t²).  covariance:
-    (..., 6, 6) T² of (C, S), joint_covariance: (..., 9, 9) T² of (b₀, C, S), the same with the static field.  turning: the frequency f with its drift d. Where it was found, its error makes the phase
-    at time zero uncertain, not the ellipse, and is not in `covariance`.  noise: (..., 3) T, the standard deviation of a
-    sample, stated or found.  residual: (..., 3) T, the root of the mean square of what is left, over the degrees of
-    freedom.  count, saturated: (..., 3), samples that were used, and left out because the sensor was full.
+    (..., 6, 6) T² of (C, S).  joint_covariance: (..., 9, 9) T² of (b₀, C, S).  turning: the frequency f with its drift
+    d. Where it was found, its error makes the phase at time zero uncertain, not the ellipse, and is not in the
+    covariances.  noise: (..., 3) T, the standard deviation of a sample, stated or found.  residual: (..., 3) T, the
+    root of the mean square of what is left, over the degrees of freedom.  count, saturated: (..., 3), samples that were
+    used, and left out because the sensor was full.
     """
 
     static: Vectors
