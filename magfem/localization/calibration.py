@@ -31,18 +31,16 @@ from magfem.localization.calibration_fit import (
     held_out,
     whitened_jacobian,
 )
-from magfem.localization.calibration_readings import FINDABLE, Layout, Motion, Unknowns
+from magfem.localization.calibration_readings import Layout, Motion, Unknowns
+from magfem.localization.calibration_setting import carried, checked_samples, measured_readings, setting
 from magfem.localization.calibration_start import first_guess
 from magfem.localization.gain_split import split_derivatives, split_gain
-from magfem.localization.orientation import upright_frame
 from magfem.localization.rotor import Model, Rotor, as_rotor
-from magfem.localization.sensor import Sensor, SensorArray, Sensors, as_sensors, is_one
-from magfem.localization.signal import demodulate
+from magfem.localization.sensor import Sensor, SensorArray, Sensors, as_sensors
 from magfem.threads import one_thread_for_algebra
 from magfem.typing import ArrayLike, Floats, Points, Vectors
 
 FIND = ("gain", "rotation", "position", "offset")
-FEWEST_SAMPLES = 6
 WORSE = 1.5
 """Residuals of this many deviations are not noise alone: known poses or the rotor's model are less good than that."""
 
@@ -71,7 +69,8 @@ class Calibration:
     common frame; NaN where no offsets were found.  moment: A·m², across the rotor's axis.  position (k, 3) m, axis
     (k, 3), phase (k,) rad: of the rotor, as known or as found.  noise: (s, 3) T of a sample.
 
-    residual: root of the sum of squared residuals, each over its deviation, over the degrees of freedom: about one.
+    residual: root of the sum of squared residuals, each over its deviation, over the degrees of freedom: about one;
+    residuals that a robust calibration trusts less count with their weight.
     misfit: (k, s), the root mean square at each pose, NaN where samples were too few to count.  weight: (k, s), below
     one where a robust calibration trusted a pose less.  held_out: (k, s) T, root mean square error with which a fit to
     all other poses predicts the quadratures of a pose.  condition: of the scaled problem.  freedom: degrees of freedom.
@@ -162,12 +161,10 @@ def calibrate(
     Raises InputError for arrays that do not belong together, and for what the readings do not determine, by its name.
     """
     rotor, array = as_rotor(model, rotation_axis), as_sensors(sensors)
-    b = _samples(samples, sensors, array)
-    layout, motion, start = _setting(
-        rotor, array, len(b), positions, axes, phase, static, sensor_poses, frozenset(find)
-    )
+    b = checked_samples(samples, sensors, array)
+    layout, motion, start = setting(array, len(b), positions, axes, phase, static, sensor_poses, frozenset(find))
     with one_thread_for_algebra():
-        measured, noise = _measured(b, times, frequency, array, layout)
+        measured, noise = measured_readings(b, times, frequency, array, layout)
         if not measured.used.any():
             raise InputError("no pose has samples enough: look at gaps and saturation")
         guess = first_guess(rotor, motion, start, layout, measured)
@@ -177,8 +174,8 @@ def calibrate(
             raise InputError(_untold(told.untold, layout))
         if strict and not fit.converged:
             raise ConvergenceError(
-                f"the calibration did not converge in {fit.iterations} steps: begin nearer to the truth, or pass "
-                "strict=False to see it all the same"
+                f"the calibration did not converge in {fit.iterations} steps: begin nearer to the truth, pass "
+                "robust=True where some poses are wrong, or strict=False to see it all the same"
             )
         return _calibration(rotor, array, layout, motion, measured, noise, fit, told)
 
@@ -209,13 +206,13 @@ def calibration_bound(
         np.shape(positions)[:-1],
         np.shape(axes)[:-1],
         () if phase is None else np.shape(phase),
-        _carried(sensor_poses),
+        carried(sensor_poses),
     )
     poses = max((shape[0] for shape in shapes if shape), default=1)
-    layout, motion, at = _setting(rotor, array, poses, positions, axes, phase, static, sensor_poses, frozenset(find))
+    layout, motion, at = setting(array, poses, positions, axes, phase, static, sensor_poses, frozenset(find))
     with one_thread_for_algebra():
         nothing = np.zeros((poses, len(array.sensors), np.shape(times)[-1], 3))
-        measured, _ = _measured(nothing, times, frequency, array, layout)
+        measured, _ = measured_readings(nothing, times, frequency, array, layout)
         _, J = whitened_jacobian(rotor, motion, at, layout, measured)
         told = determined(J, layout.names)
     _, covariance = _reported(layout, at, told.covariance)
@@ -232,134 +229,6 @@ def calibration_bound(
         for j, one in enumerate(deviations)
     )
     return CalibrationBound(told.untold, told.condition, unbounded)
-
-
-def _samples(samples: ArrayLike, sensors: Sensors, array: SensorArray) -> Floats:
-    """(k, s, n, 3)."""
-    try:
-        b = np.asarray(samples, dtype=float)
-    except (TypeError, ValueError):
-        raise InputError("samples must be real numbers in T") from None
-    if is_one(sensors) and b.ndim == 3:
-        b = b[:, None]
-    if b.ndim != 4 or b.shape[1] != len(array.sensors) or b.shape[-1] != 3 or not b.size:
-        expected = "(poses, n, 3)" if is_one(sensors) else f"(poses, {len(array.sensors)}, n, 3)"
-        raise InputError(f"samples of a calibration must be {expected}, got {np.shape(samples)}")
-    return b
-
-
-def _carried(poses: RigidTransform | Sequence[RigidTransform] | None) -> tuple[int, ...]:
-    return () if poses is None or (isinstance(poses, RigidTransform) and poses.single) else (len(poses),)
-
-
-def _setting(
-    rotor: Rotor,
-    array: SensorArray,
-    count: int,
-    positions: ArrayLike,
-    axes: ArrayLike,
-    phase: ArrayLike | None,
-    static: ArrayLike | None,
-    sensor_poses: RigidTransform | Sequence[RigidTransform] | None,
-    find: frozenset[str],
-) -> tuple[Layout, Motion, Unknowns]:
-    """What is to be found, how things move, and what everything nominally is."""
-    if strange := sorted(find - set(FINDABLE)):
-        raise InputError(f"find has {strange[0]!r}; it can have {', '.join(FINDABLE)}")
-    if "phase" in find and phase is None:
-        raise InputError('find has "phase", a number added to stated phases: state them, or leave it out')
-    if "rotor" in find and (np.ndim(positions) != 1 or np.ndim(axes) != 1):
-        raise InputError('find has "rotor", which is for one at rest: give one position (3,) and one axis (3,)')
-    place = _rows(positions, (count, 3), "positions", "m")
-    axis = _rows(axes, (count, 3), "axes", "")
-    if not np.linalg.norm(axis, axis=-1).all():
-        raise InputError("axes must not be zero")
-    turned = np.zeros(count) if phase is None else _rows(phase, (count,), "phase", "rad")
-    field = np.zeros(3) if static is None else _rows(static, (3,), "static", "T")
-    layout = Layout(
-        sensors=len(array.sensors),
-        poses=count,
-        find=find,
-        background=static is None and "offset" in find,
-        each_phase=phase is None,
-    )
-    motion = Motion(*_carriers(sensor_poses, count), array.axes)
-    unknowns = Unknowns(
-        matrix=array.gains,
-        gain=array.gains,
-        place=array.positions,
-        offset=np.array([one.offset for one in array.sensors], dtype=float),
-        static=field,
-        moment=1.0,
-        rotor=place,
-        upright=upright_frame(axis),
-        phase=turned,
-    )
-    return layout, motion, unknowns
-
-
-def _rows(value: ArrayLike, shape: tuple[int, ...], name: str, unit: str) -> Floats:
-    try:
-        found = np.broadcast_to(np.asarray(value, dtype=float), shape)
-    except (TypeError, ValueError):
-        raise InputError(f"{name} must be numbers {shape} {unit}".rstrip() + f", got {np.shape(value)}") from None
-    if not np.isfinite(found).all():
-        raise InputError(f"{name} must be finite numbers")
-    return found
-
-
-def _carriers(poses: RigidTransform | Sequence[RigidTransform] | None, count: int) -> tuple[Points, Floats]:
-    if poses is None:
-        return np.zeros((count, 3)), np.broadcast_to(np.eye(3), (count, 3, 3))
-    several = [poses] if isinstance(poses, RigidTransform) and poses.single else list(poses)
-    if not all(isinstance(one, RigidTransform) and one.single for one in several) or len(several) not in (1, count):
-        raise InputError(f"sensor_poses must be {count} RigidTransforms, one for each pose, got {len(several)}")
-    places = np.array([one.translation for one in several])
-    axes = np.array([one.rotation.as_matrix() for one in several])
-    return np.broadcast_to(places, (count, 3)), np.broadcast_to(axes, (count, 3, 3))
-
-
-def _measured(
-    b: Floats, times: ArrayLike, frequency: float, array: SensorArray, layout: Layout
-) -> tuple[Readings, Floats]:
-    """Readings of samples (k, s, n, 3), and the noise (s, 3) T of a sample, where not stated found from all poses."""
-    k, s, n, _ = b.shape
-    t = np.asarray(times, dtype=float)
-    if t.shape not in ((n,), (k, n)):
-        raise InputError(f"times must be ({n},) or ({k}, {n}) s for samples {b.shape}, got {t.shape}")
-    first = 0 if layout.static_used else 3
-    values, whitening, noise = np.zeros((k, s, 9)), np.zeros((k, s, 9 - first, 9 - first)), np.zeros((s, 3))
-    for j, one in enumerate(array.sensors):
-        usable = (~np.isnan(b[:, j]) & (np.abs(b[:, j]) < one.saturation)).sum(axis=1).min(axis=-1)
-        used = np.flatnonzero(usable >= max(FEWEST_SAMPLES, n / 2))
-        if not used.size:
-            continue
-        own = t if t.ndim == 1 else t[used]
-        found, covariance, left = _demodulated(b[used, j], own, frequency, one, one.noise)
-        if one.noise is None:  # all poses share one noise
-            left = np.sqrt(np.mean(left**2, axis=0))
-            found, covariance, left = _demodulated(b[used, j], own, frequency, one, left)
-        noise[j] = np.sqrt(np.mean(left**2, axis=0))
-        values[used, j] = found
-        whitening[used, j] = np.linalg.inv(np.linalg.cholesky(covariance[:, first:, first:]))
-    return Readings(values, whitening), noise
-
-
-def _demodulated(
-    b: Floats, t: Floats, frequency: float, sensor: Sensor, noise: ArrayLike | None
-) -> tuple[Floats, Floats, Floats]:
-    """(k, 9), (k, 9, 9) and noise (k, 3) of one sensor's samples (k, n, 3) at times (n,) or (k, n)."""
-    resolution = 0.0 if sensor.noise is None else sensor.resolution  # noise that is found has it already
-    pieces = [(b, t)] if t.ndim == 1 else zip(b[:, None], t, strict=True)
-    fields = [
-        demodulate(part, when, frequency, noise=noise, resolution=resolution, saturation=sensor.saturation)
-        for part, when in pieces
-    ]
-    return (
-        np.concatenate([np.concatenate([one.static, one.cosine, one.sine], axis=-1) for one in fields]),
-        np.concatenate([one.joint_covariance for one in fields]),
-        np.concatenate([one.noise for one in fields]),
-    )
 
 
 def _calibration(
@@ -398,7 +267,7 @@ def _calibration(
         axis=at.upright[..., 2],
         phase=np.asarray(np.angle(np.exp(1j * at.phase))),
         noise=noise,
-        residual=float(np.sqrt(square.sum() / max(freedom, 1))),
+        residual=float(np.sqrt((fit.weight * square).sum() / max(freedom, 1))),
         misfit=np.where(used, plain, np.nan),
         weight=fit.weight,
         held_out=held_out(fit, told.covariance, measured.whitening),

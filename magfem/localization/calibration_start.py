@@ -24,7 +24,8 @@ CLEARLY = 0.25  # how much less another mounting must leave than the nominal one
 def first_guess(rotor: Rotor, motion: Motion, at: Unknowns, layout: Layout, measured: Readings) -> Unknowns:
     """`at`, with phases where they are not known, and with reading matrices where they are to be found.
 
-    Where phases are unknown, all 24 ways to mount a sensor along its nominal axes are tried.
+    Where phases are unknown, all 24 ways to mount a sensor along its nominal axes are tried. All readings reversed are
+    half a turn in every phase then: a sensor is left-handed or right-handed as it nominally is.
     """
     plain = replace(at, matrix=np.broadcast_to(np.eye(3), at.matrix.shape), offset=np.zeros_like(at.offset))
     values, _ = readings(rotor, motion, plain, layout)
@@ -70,6 +71,8 @@ def _matrix(f: Complexes, h: Complexes, nominal: Floats, gain: Floats, layout: L
             if rank < 3 or values[-1] < 1e-3 * values[0]:
                 return nominal
             matrix = found.T if "gain" in layout.find else gain @ split_gain(np.linalg.inv(gain) @ found.T)[1]
+            if open_phase and np.linalg.det(matrix) * np.linalg.det(nominal) < 0:
+                matrix = -matrix
         left = float(np.sum((rows @ matrix.T - read) ** 2))
         if not np.isfinite(least) or left < CLEARLY * least:
             best, least = matrix, left

@@ -77,7 +77,7 @@ def sensors_to_dict(sensors: Mapping[str, Sensor]) -> dict[str, Any]:
 
 
 def write_sensors(path: Path, sensors: Mapping[str, Sensor], source: str = "") -> None:
-    """A card that `read_sensors` reads back to the last bit: TOML, or JSON where `path` ends in .json.
+    """A card that `read_sensors` reads back: TOML, or JSON where `path` ends in .json.
 
     source: where the sensors come from, such as a calibration and its date. Raises InputError where it cannot be
     written.
@@ -88,9 +88,13 @@ def write_sensors(path: Path, sensors: Mapping[str, Sensor], source: str = "") -
         write_json(path, card)
         return
     # What JSON writes of text and lists of numbers is TOML as well.
-    lines = [f"{key} = {json.dumps(card[key])}" for key in card if key != "sensors"]
+    lines = [f"{key} = {json.dumps(card[key], ensure_ascii=False)}" for key in card if key != "sensors"]
     for entry in card["sensors"]:
-        lines += ["", "[[sensors]]", *(f"{key} = {json.dumps(value)}" for key, value in entry.items())]
+        lines += [
+            "",
+            "[[sensors]]",
+            *(f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in entry.items()),
+        ]
     write_text(path, "\n".join(lines) + "\n")
 
 
