@@ -29,10 +29,7 @@ def setting_of(find, phase):
         RigidTransform.from_components(place, Rotation.random(random_state=rng)) for place in bench.around(rng, 4)
     ]
     position, axis = np.array([1e-3, 2e-3, -1e-3]), np.array([0.3, -0.2, 0.8])
-    if phase is None:  # each its own: where it is sought, it begins at zero
-        known = np.zeros(4)
-    else:
-        known = np.full(4, phase)
+    known = np.full(4, phase or 0.0)  # where each has its own it begins at zero
     array = as_sensors(sensors)
     layout, motion, at = setting(array, 4, position, axis, phase, bench.EARTH, carriers, frozenset(find))
     return sensors, carriers, position, axis, known, layout, motion, at
