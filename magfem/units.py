@@ -56,6 +56,7 @@ DIMENSIONS: dict[str, Dimension] = {
     "time": Dimension("time", "s", "10 ms"),
     # To pint a revolution per minute is 0.105 Hz: only what is told in hertz is taken.
     "frequency": Dimension("frequency", "Hz", "20 Hz", only=("hertz", "millihertz", "kilohertz", "megahertz")),
+    "speed": Dimension("speed", "m/s", "8 mm/s", symbol="m/s"),
     "mass": Dimension("mass", "kg", "2 g", symbol="g", scale=1e-3),
     "density": Dimension("density", "kg/m^3", "7500 kg/m^3", symbol="kg/m³", prefixes=False),
     "acceleration": Dimension("acceleration", "m/s^2", "9.81 m/s^2", symbol="m/s²", prefixes=False),

@@ -21,8 +21,6 @@ SECTIONS = (
 )
 """Key in the JSON, heading, folder and ending of everything that has a name."""
 
-_SCENARIO = "scenario"  # the kind of recipe that shares its folder with reports
-
 
 def add(commands: CommandLine) -> None:
     """Add the command."""
@@ -38,10 +36,11 @@ def add(commands: CommandLine) -> None:
 
 def run(options: Namespace) -> int:
     """Print the names, section by section."""
+    from magfem.cli.scenario_kinds import KINDS
     from magfem.geometry.catalogue import folder, names
 
     found = {key: names(section, suffix) for key, _, section, suffix in SECTIONS}
-    scenarios = {name for name in found["scenarios"] if _entry(folder("reports") / f"{name}.toml", "kind") == _SCENARIO}
+    scenarios = {name for name in found["scenarios"] if _entry(folder("reports") / f"{name}.toml", "kind") in KINDS}
     found["scenarios"] = tuple(name for name in found["scenarios"] if name in scenarios)
     found["reports"] = tuple(name for name in found["reports"] if name not in scenarios)
     text = "\n\n".join(

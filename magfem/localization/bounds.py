@@ -51,8 +51,9 @@ class PoseBound:
     @property
     def direction(self) -> Floats:
         """(...) rad, of the line to the magnet."""
-        _, r = self._sight
-        return np.asarray(np.sqrt(np.maximum(self.position**2 - self.distance**2, 0.0)) / r)
+        towards, r = self._sight
+        across = np.eye(3) - towards[..., :, None] * towards[..., None, :]
+        return np.asarray(np.sqrt(np.einsum("...ij,...ji->...", across, self.covariance[..., :3, :3])) / r)
 
     @property
     def axis(self) -> Floats:

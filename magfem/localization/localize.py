@@ -38,7 +38,7 @@ def localize(
     frequency: ArrayLike | None = None,
     sensors: Sensors = None,
     *,
-    near: ArrayLike | Pose | None = None,
+    near: ArrayLike | Branch | None = None,
     rotation_axis: ArrayLike = (0.0, 0.0, 1.0),
     drift: bool = False,
     strict: bool = True,
@@ -49,8 +49,8 @@ def localize(
     times: (n,) s; or (s, n), one sensor that is moved from place to place while the magnet goes on turning.
     model: of the magnet's field: a model, its name or file, or a `Rotor`.  frequency: Hz; None to find it.
     sensors: None, one, or a sequence: of `Sensor`, or of poses in the common frame.
-    near: where the rotor is about, (..., 3) m or an earlier pose: the branch closest to it is taken among those that
-    are about as likely. Without it, one sensor's branch is the one with z > 0 and the axis nearest to +z.
+    near: where the rotor is about, (..., 3) m, or an earlier or expected pose: the branch closest to it is taken among
+    those that are about as likely. Without it, one sensor's branch is the one with z > 0 and the axis nearest to +z.
     rotation_axis: (3,), in the model's frame.  drift: the frequency changes steadily, from near `frequency`.
     strict: raise ConvergenceError where a refinement did not converge, instead of telling by `converged`.
 
@@ -71,7 +71,7 @@ def localize_several(
     frequencies: Sequence[float] | Floats,
     sensors: Sensors = None,
     *,
-    near: Sequence[ArrayLike | Pose | None] | None = None,
+    near: Sequence[ArrayLike | Branch | None] | None = None,
     rotation_axis: ArrayLike = (0.0, 0.0, 1.0),
     strict: bool = True,
 ) -> tuple[Pose, ...]:
@@ -110,7 +110,7 @@ def locate_field(
     model: Model,
     sensors: Sensors = None,
     *,
-    near: ArrayLike | Pose | None = None,
+    near: ArrayLike | Branch | None = None,
     rotation_axis: ArrayLike = (0.0, 0.0, 1.0),
     strict: bool = True,
 ) -> Pose:
@@ -172,7 +172,7 @@ def _demodulated(
 
 
 def _located(
-    fields: tuple[RotatingField, ...], rotor: Rotor, array: SensorArray, near: ArrayLike | Pose | None, strict: bool
+    fields: tuple[RotatingField, ...], rotor: Rotor, array: SensorArray, near: ArrayLike | Branch | None, strict: bool
 ) -> Pose:
     measured = whitened(fields, array)
     position, frame, clamped = _starts(measured, rotor, array)
@@ -226,7 +226,7 @@ def _pose(
     measured: Measured,
     refined: Refined,
     clamped: Booleans,
-    near: ArrayLike | Pose | None,
+    near: ArrayLike | Branch | None,
 ) -> Pose:
     # log det of the covariance is −2 log det of its whitening, a triangular matrix.
     log_determinant = -2 * np.log(np.abs(np.einsum("...saa->...sa", measured.whitening))).sum(axis=(-2, -1))
@@ -274,7 +274,7 @@ def _pose(
     )
 
 
-def _ranked(refined: Refined, log_likelihood: Floats, near: ArrayLike | Pose | None) -> tuple[Integers, Booleans]:
+def _ranked(refined: Refined, log_likelihood: Floats, near: ArrayLike | Branch | None) -> tuple[Integers, Booleans]:
     """The order (..., k) of the candidates, best first, and which of them (..., k) are no repetitions of a better one.
 
     Log likelihoods are compared in steps of a tenth, so that rounding does not order what is equal.
@@ -285,12 +285,12 @@ def _ranked(refined: Refined, log_likelihood: Floats, near: ArrayLike | Pose | N
     if near is None:
         prefer = -np.sign(position[..., 2]) + 0.1 * (1 - axis[..., 2])
     else:
-        where = near.position if isinstance(near, Pose) else np.asarray(near, dtype=float)
+        where = near.position if isinstance(near, Branch) else np.asarray(near, dtype=float)
         if where.shape[-1:] != (3,) or not np.isfinite(where).all():
             raise InputError("near must be positions (..., 3) in m, or a pose")
         size = np.linalg.norm(position, axis=-1)
         prefer = np.linalg.norm(position - where[..., None, :], axis=-1) / np.maximum(size, 1e-12)
-        if isinstance(near, Pose):
+        if isinstance(near, Branch):
             prefer = prefer + np.linalg.norm(axis - near.axis[..., None, :], axis=-1)
         behind = np.where(best - log_likelihood < PLAUSIBLE, 0.0, behind)
     order = np.lexsort((prefer, behind), axis=-1)

@@ -22,7 +22,7 @@ class DrawnPoses:
 
 
 def drawn_poses(distance: Floats, beta: Floats, generator: np.random.Generator) -> DrawnPoses:
-    """Poses at `distance` (...) m whose sensor is at `beta` (...) rad above or below the rotation plane, else random."""
+    """Poses at `distance` (...) m, the sensor at `beta` (...) rad above or below the rotation plane, else random."""
     shape = np.broadcast_shapes(np.shape(distance), np.shape(beta))
     axis = _unit(generator.normal(size=(*shape, 3)))
     across = _unit(np.cross(axis, generator.normal(size=(*shape, 3))))

@@ -1,4 +1,4 @@
-"""Fig. S6.11: errors of direction and axis over the distance, for sensors of different noise, and how far they reach."""
+"""Fig. S6.11: errors of direction and axis over the distance, for sensors of different noise, and their reach."""
 
 from __future__ import annotations
 

@@ -152,7 +152,8 @@ def _followed(study: TrackStudy, name: str, position: Points, axis: Vectors, see
     rotor, sensors = as_rotor(study.model), study.sensors
     generator = np.random.default_rng(seed)
     phase = generator.uniform(-np.pi, np.pi, len(position))
-    clean = simulated_samples(rotor, position, axis, study.times, study.frequency, sensors, phase=phase)
+    quiet = [one.pose for one in sensors]  # the noise is added below
+    clean = simulated_samples(rotor, position, axis, study.times, study.frequency, quiet, phase=phase)
     samples = study.noise.added(clean, generator)
     starts = study.length * np.arange(len(position))
     found = track(samples, study.times, rotor, study.frequency, sensors, starts=starts, strict=False)
