@@ -1,6 +1,13 @@
 """Localization: where a magnet is that turns about an axis, from the field that it makes at one sensor or more."""
 
 from magfem.localization.bounds import PoseBound, pose_bound
+from magfem.localization.calibration import (
+    Calibration,
+    CalibrationBound,
+    SensorDeviation,
+    calibrate,
+    calibration_bound,
+)
 from magfem.localization.design import Placement, Workspace, needed_noise, place_sensors, reach, workspace
 from magfem.localization.dipole_pose import DipolePoses, dipole_poses
 from magfem.localization.following import Belief, follow
@@ -17,6 +24,8 @@ from magfem.localization.tracking import Track, track, windows
 __all__ = [
     "Belief",
     "Branch",
+    "Calibration",
+    "CalibrationBound",
     "DipolePoses",
     "Frequency",
     "Placement",
@@ -26,10 +35,13 @@ __all__ = [
     "RotatingField",
     "Rotor",
     "Sensor",
+    "SensorDeviation",
     "Spectrum",
     "Track",
     "Workspace",
     "as_rotor",
+    "calibrate",
+    "calibration_bound",
     "demodulate",
     "demodulate_several",
     "dipole_poses",

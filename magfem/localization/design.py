@@ -34,9 +34,9 @@ WELL_TOLD = (float(np.radians(25.0)), float(np.radians(75.0)))
 class Workspace:
     """How well a rotor is told at points (..., 3) m, over axes (k, 3).
 
-    position, axis: (...) m and rad, root mean squares over the axes of the bounds.  worst_position, worst_axis: (...).
-    wrong_branch: (...) probability, the largest over the axes, that another branch fits the samples better; one half
-    with a single sensor, for a branch that nothing tells apart.
+    position, axis: (...) m and rad, medians over the axes of the bounds: with one sensor some axes are not told at all.
+    worst_position, worst_axis: (...).  wrong_branch: (...) probability, the largest over the axes, that another branch
+    fits the samples better; one half with a single sensor, for a branch that nothing tells apart.
     """
 
     points: Points
@@ -48,7 +48,7 @@ class Workspace:
     wrong_branch: Floats
 
     def within(self, position: float, axis: float, wrong_branch: float = 0.005) -> Booleans:
-        """(...) whether these bounds (m, rad, probability) are kept: the workspace."""
+        """(...) whether these bounds (m, rad, probability) are kept in the median: the workspace."""
         return np.asarray((self.position <= position) & (self.axis <= axis) & (self.wrong_branch <= wrong_branch))
 
 
@@ -63,12 +63,12 @@ def workspace(
 ) -> Workspace:
     """The workspace of sensors, whose noise must be stated, at `points` (..., 3) m.
 
-    axes: (k, 3), directions that the rotor's axis may have; unless stated, twelve evenly over all directions. Raises
+    axes: (k, 3), directions that the rotor's axis may have; unless stated, sixteen evenly over all directions. Raises
     InputError as `pose_bound` does.
     """
     rotor, array = as_rotor(model), as_sensors(sensors)
     place = np.asarray(points, dtype=float)
-    along = np.asarray(_ICOSAHEDRON if axes is None else axes, dtype=float)
+    along = np.asarray(_AXES if axes is None else axes, dtype=float)
     if along.ndim != 2 or along.shape[1] != 3:
         raise InputError(f"axes must be (k, 3), got {along.shape}")
     with one_thread_for_algebra():
@@ -77,8 +77,8 @@ def workspace(
     return Workspace(
         points=place,
         axes=along,
-        position=_mean(bound.position),
-        axis=_mean(bound.axis),
+        position=np.median(bound.position, axis=-1),
+        axis=np.median(bound.axis, axis=-1),
         worst_position=bound.position.max(axis=-1),
         worst_axis=bound.axis.max(axis=-1),
         wrong_branch=wrong,
@@ -112,15 +112,16 @@ def _wrong_branch(rotor: Rotor, array: SensorArray, place: Points, axes: Vectors
     return np.asarray(wrong.reshape(*lead, len(axes)).max(axis=-1))
 
 
-def _golden_icosahedron() -> Floats:
-    g = (1 + np.sqrt(5)) / 2
-    corners = [[0, s, t * g] for s in (1, -1) for t in (1, -1)]
-    every = np.array([np.roll(one, k) for one in corners for k in range(3)])
-    return np.asarray(every / np.linalg.norm(every, axis=1, keepdims=True))
+def _half_sphere(count: int) -> Floats:
+    """(count, 3) unit vectors evenly over half of all directions, along a spiral of golden angles."""
+    z = (np.arange(count) + 0.5) / count
+    turn = np.pi * (3 - np.sqrt(5)) * np.arange(count)
+    level = np.sqrt(1 - z**2)
+    return np.stack([level * np.cos(turn), level * np.sin(turn), z], axis=-1)
 
 
-_ICOSAHEDRON = _golden_icosahedron()
-"""Twelve directions, evenly."""
+_AXES = _half_sphere(16)
+"""Axes of all directions: one and its opposite turn the same way round."""
 
 
 def needed_noise(
@@ -217,7 +218,7 @@ def place_sensors(
     rotor = as_rotor(model)
     points = np.asarray(region, dtype=float)
     lower, upper = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
-    along = np.asarray(_ICOSAHEDRON if axes is None else axes, dtype=float)
+    along = np.asarray(_AXES if axes is None else axes, dtype=float)
     if points.ndim != 2 or points.shape[1] != 3 or not len(points):
         raise InputError(f"region must be points (n, 3) in m, got {points.shape}")
     if lower.shape != (3,) or upper.shape != (3,) or not np.all(lower <= upper):

@@ -55,6 +55,21 @@ class Rotor:
         B, gradient = self.turning.jet(stacked, 1, outside="extrapolate")
         return B[0], B[1] @ _QUARTER.T, gradient[0], _QUARTER @ gradient[1] @ _QUARTER.T
 
+    def steady(self, points: Points) -> tuple[Vectors, Tensors]:
+        """b₀ (..., 3) T at `points` (..., 3) m of the rotor's frame, the mean over a turn, and its gradient T/m.
+
+        It comes of a moment along the axis, and of even harmonics very near; a diametric cylinder has none.
+        """
+        points = np.asarray(points, dtype=float)
+        if self.turning is self.field:
+            return np.zeros(points.shape), np.zeros((*points.shape, 3))
+        angles = 2 * np.pi * np.arange(copies := _copies(self.field)) / copies
+        turns = Rotation.from_rotvec(angles[:, None] * np.array([0.0, 0.0, 1.0])).as_matrix()
+        seen = np.einsum("cij,...i->c...j", turns, points)
+        B, gradient = self.field.jet(seen, 1, outside="extrapolate")
+        turned = np.einsum("cij,c...jk,clk->...il", turns, gradient, turns)
+        return np.einsum("cij,c...j->...i", turns, B) / copies, turned / copies
+
 
 Model: TypeAlias = Rotor | Field | str | os.PathLike[str]
 """A rotor, a field model of one, or the model's name or file."""
@@ -111,8 +126,7 @@ def _turning(field: Field) -> Field:
     terms = getattr(field, "lowered", None)
     if isinstance(terms, Terms) and _of_order_one(terms):
         return field
-    highest = int(terms.degree.max()) if isinstance(terms, Terms) else 0
-    copies = max(_FEWEST_COPIES, highest + 2)
+    copies = _copies(field)
     angles = 2 * np.pi * np.arange(copies) / copies
     turned = [
         Scaled(
@@ -123,6 +137,12 @@ def _turning(field: Field) -> Field:
         for angle in angles
     ]
     return Summed(tuple(turned))
+
+
+def _copies(field: Field) -> int:
+    terms = getattr(field, "lowered", None)
+    highest = int(terms.degree.max()) if isinstance(terms, Terms) else 0
+    return max(_FEWEST_COPIES, highest + 2)
 
 
 def _of_order_one(terms: Terms) -> bool:

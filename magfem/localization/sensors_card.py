@@ -28,7 +28,7 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from magfem.errors import CardError, InputError
-from magfem.files import read_json
+from magfem.files import read_json, write_json, write_text
 from magfem.geometry.card import CardOrigin, Table, read_table
 from magfem.geometry.vectors import three_lengths
 from magfem.localization.sensor import Sensor
@@ -74,6 +74,28 @@ def sensors_to_dict(sensors: Mapping[str, Sensor]) -> dict[str, Any]:
             for name, one in sensors.items()
         ],
     }
+
+
+def write_sensors(path: Path, sensors: Mapping[str, Sensor], source: str = "") -> None:
+    """A card that `read_sensors` reads back: TOML, or JSON where `path` ends in .json.
+
+    source: where the sensors come from, such as a calibration and its date. Raises InputError where it cannot be
+    written.
+    """
+    card = sensors_to_dict(sensors)
+    card = {"kind": card["kind"], **({"source": source} if source else {}), "sensors": card["sensors"]}
+    if path.suffix.lower() == ".json":
+        write_json(path, card)
+        return
+    # What JSON writes of text and lists of numbers is TOML as well.
+    lines = [f"{key} = {json.dumps(card[key], ensure_ascii=False)}" for key in card if key != "sensors"]
+    for entry in card["sensors"]:
+        lines += [
+            "",
+            "[[sensors]]",
+            *(f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in entry.items()),
+        ]
+    write_text(path, "\n".join(lines) + "\n")
 
 
 def _card(file: Path, shown: str) -> Table:

@@ -26,16 +26,18 @@ class RotatingField:
     """What the samples say of one rotation frequency, at one three-axis sensor or many.
 
     static, cosine, sine: (..., 3) T, of the field b₀ + C cos φ + S sin φ with φ = 2π(f t + ½ d t²).  covariance:
-    (..., 6, 6) T² of (C, S).  turning: the frequency f with its drift d. Where it was found, its error makes the phase
-    at time zero uncertain, not the ellipse, and is not in `covariance`.  noise: (..., 3) T, the standard deviation of a
-    sample, stated or found.  residual: (..., 3) T, the root of the mean square of what is left, over the degrees of
-    freedom.  count, saturated: (..., 3), samples that were used, and left out because the sensor was full.
+    (..., 6, 6) T² of (C, S).  joint_covariance: (..., 9, 9) T² of (b₀, C, S).  turning: the frequency f with its drift
+    d. Where it was found, its error makes the phase at time zero uncertain, not the ellipse, and is not in the
+    covariances.  noise: (..., 3) T, the standard deviation of a sample, stated or found.  residual: (..., 3) T, the
+    root of the mean square of what is left, over the degrees of freedom.  count, saturated: (..., 3), samples that were
+    used, and left out because the sensor was full.
     """
 
     static: Vectors
     cosine: Vectors
     sine: Vectors
     covariance: Floats
+    joint_covariance: Floats
     turning: Frequency
     noise: Vectors
     residual: Vectors
@@ -253,18 +255,22 @@ def _rotating(fitted: _Fitted, j: int, turning: Frequency) -> RotatingField:
     """Frequency j of a fit about the middle of the times, its quadratures turned back to time zero."""
     first = 1 + 2 * j
     C, S = fitted.coefficients[..., first, :], fitted.coefficients[..., first + 1, :]
-    own = fitted.inverse[..., first : first + 2, first : first + 2] * (fitted.noise**2)[..., None, None]
+    chosen = np.array([0, first, first + 1])
+    own = fitted.inverse[..., chosen[:, None], chosen] * (fitted.noise**2)[..., None, None]
     back = 2 * np.pi * turning.turns(np.zeros(1))  # (..., 1) rad, of time zero seen from the middle
     c, s = np.cos(back), np.sin(back)
     # C cos(φ + back) + S sin(φ + back): the quadratures that belong to φ, zero at time zero.
-    turn = np.stack([np.stack([c, s], axis=-1), np.stack([-s, c], axis=-1)], axis=-2)  # (..., 1, 2, 2)
-    own = turn @ own @ np.swapaxes(turn, -1, -2)  # (..., 3, 2, 2)
-    covariance = np.einsum("...apq,ab->...paqb", own, np.eye(3)).reshape(*C.shape[:-1], 6, 6)
+    one, none = np.ones_like(c), np.zeros_like(c)
+    rows = [np.stack(row, axis=-1) for row in ((one, none, none), (none, c, s), (none, -s, c))]
+    turn = np.stack(rows, axis=-2)  # (..., 1, 3, 3)
+    own = turn @ own @ np.swapaxes(turn, -1, -2)  # (..., 3, 3, 3)
+    joint = np.einsum("...apq,ab->...paqb", own, np.eye(3)).reshape(*C.shape[:-1], 9, 9)
     return RotatingField(
         static=fitted.coefficients[..., 0, :],
         cosine=c * C + s * S,
         sine=c * S - s * C,
-        covariance=covariance,
+        covariance=joint[..., 3:, 3:],
+        joint_covariance=joint,
         turning=turning,
         noise=fitted.noise,
         residual=fitted.residual,

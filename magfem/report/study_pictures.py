@@ -251,7 +251,7 @@ def workspaces(found: WorkspaceMaps) -> list[Picture]:
         ("axis", DEGREE, "axis (deg)", np.array([0.5, 1, 2, 5, 10, 20, 40, 80]), DEGREE * study.axis),
     )
     with drawing():
-        drawn = figure(5.0, _WIDE)
+        drawn = figure(3.6, _WIDE)
         panels = drawn.subplots(2, count, sharex=True, sharey=True, squeeze=False)
         for (name, scale, label, levels, limit), line in zip(rows, panels, strict=True):
             for one, spacing, axes in zip(found.maps, study.spacings, line, strict=True):
@@ -291,9 +291,9 @@ def workspaces(found: WorkspaceMaps) -> list[Picture]:
         content,
         "Maps of the bounds of position and axis about one sensor and about pairs of sensors.",
         f"Cramér–Rao bound about sensors (squares) of {study.noise.deviation * MICRO:.3g} µT with {study.duration:g} s "
-        f"at {study.rate:g} Hz, root mean squares over all directions of the rotor’s axis. White: the limits of "
-        f"{MILLI * study.position:g} mm and {DEGREE * study.axis:g}°. Beyond the dashed line a wrong branch is likelier "
-        "than once in 200; with one sensor the branch must be known.",
+        f"at {study.rate:g} Hz, medians over all directions of the rotor’s axis. White: the limits of "
+        f"{MILLI * study.position:g} mm and {DEGREE * study.axis:g}°. Beyond the dashed line a wrong branch is "
+        "likelier than once in 200; with one sensor the branch must be known.",
     )
     return [maps, _placed(found)]
 

@@ -77,6 +77,13 @@ EXPECTED = {
         ("surely(both, position) and not both.ambiguous", True, 0),
         ("np.sqrt(np.mean(off**2)) < 1 and not found.ambiguous", True, 0),
         ("[axis_off(one.axis, turned) for one in (as_published, mended, ours)] == [9.7, 9.0, 5.2]", True, 0),
+        (
+            "np.all(np.abs(found.sensors[0].gain - gain) < 4 * found.deviations[0].gain) and found.residual < 1.5",
+            True,
+            0,
+        ),
+        ("bound.untold == ('the offset of the sensor', 'the static field') and np.isinf(bound.condition)", True, 0),
+        ("repr(float(found.sensors[0].offset[2])) in Path('calibrated.toml').read_text()", True, 0),
         ("samples.shape[0] * array.shape[0]", 1200, 0),
     ],
     "coil-systems.md": [

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from magfem.errors import CardError, InputError
-from magfem.localization.sensors_card import read_sensors, sensors_to_dict
+from magfem.localization.sensors_card import read_sensors, sensors_to_dict, write_sensors
 
 CARD = """\
 kind = "sensors"
@@ -65,6 +65,23 @@ def test_a_card_in_json_is_the_same_and_comes_back(tmp_path: Path) -> None:
         assert (same.resolution, same.saturation) == (one.resolution, one.saturation)
         assert np.array_equal(same.readings(np.ones(3)), one.readings(np.ones(3)))
         assert (same.noise is None) == (one.noise is None) and np.array_equal(same.noise, one.noise)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("name", ["new.toml", "new.json"])
+def test_a_card_that_is_written_reads_back(name: str, tmp_path: Path) -> None:
+    path, other = tmp_path / "s.toml", tmp_path / name
+    path.write_text(CARD)
+    sensors = read_sensors(path, "s.toml")
+    write_sensors(other, sensors, source='bench "A", µT, 2025')
+    again = read_sensors(other, name)
+    assert 'bench \\"A\\", µT' in other.read_text(encoding="utf-8")
+    assert list(again) == list(sensors)
+    for one, same in zip(sensors.values(), again.values(), strict=True):
+        assert same.pose.as_matrix() == pytest.approx(one.pose.as_matrix(), abs=1e-15)
+        assert (same.resolution, same.saturation) == (one.resolution, one.saturation)
+        assert np.array_equal(same.gain, one.gain) and np.array_equal(same.offset, one.offset)
+    with pytest.raises(InputError):
+        write_sensors(tmp_path / "nowhere" / name, sensors)
 
 
 @pytest.mark.parametrize(
