@@ -99,6 +99,8 @@ def find_frequency(
     for _ in range(_MOST_STEPS):
         information, gradient, misfit = _linearised(b, tau, used, f, d, weights)
         information, gradient = information[..., chosen, :][..., chosen], gradient[..., chosen]
+        if not np.all(np.linalg.det(information) > 0):
+            raise _lost()
         step = np.linalg.solve(information, gradient[..., None])[..., 0]
         size = np.abs(step[..., 0]) * span
         step = step * np.minimum(1.0, 0.25 / np.maximum(size, 1e-300))[..., None]  # beyond it has left the peak
@@ -112,10 +114,14 @@ def find_frequency(
         scale = misfit / np.maximum(used.sum(axis=(-2, -1)) - 3 * columns - len(chosen), 1)
     variance = scale * np.linalg.inv(information)[..., 0, 0]
     if not np.all((f > 0) & (size < 1e-6) & (variance >= 0) & (variance * span**2 < 0.1)):
-        raise InputError(
-            "no rotation frequency stands out of the noise in these samples: state it, or take more or longer samples"
-        )
+        raise _lost()
     return Frequency(f, np.sqrt(variance), d, middle)
+
+
+def _lost() -> InputError:
+    return InputError(
+        "no rotation frequency stands out of the noise in these samples: state it, or take more or longer samples"
+    )
 
 
 def _start(b: Floats, t: Floats, used: Booleans, near: ArrayLike | None, drift: bool) -> tuple[Floats, Floats]:

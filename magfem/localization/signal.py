@@ -233,7 +233,9 @@ def _fit(
 
 
 def _separable(normal: Floats, frequencies: Floats | None) -> None:
-    scale = np.sqrt(np.maximum(np.einsum("...kk->...k", normal), np.finfo(float).tiny))
+    size = np.einsum("...kk->...k", normal)
+    # A sine sampled at its own zeros is a column of rounding errors: it must not be scaled up to count.
+    scale = np.sqrt(np.maximum(size, 1e-8 * size.max(axis=-1, keepdims=True)))
     eigenvalues = np.linalg.eigvalsh(normal / (scale[..., :, None] * scale[..., None, :]))
     with np.errstate(divide="ignore", invalid="ignore"):
         condition = np.sqrt(eigenvalues[..., -1] / np.maximum(eigenvalues[..., 0], 0.0))
