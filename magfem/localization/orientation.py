@@ -13,9 +13,11 @@ def upright_frame(axis: ArrayLike) -> Floats:
     Its first column is where the moment points at phase zero.
     """
     x, y, z = np.moveaxis(np.asarray(axis, dtype=float) / np.linalg.norm(axis, axis=-1, keepdims=True), -1, 0)
-    down = z < -1 + 1e-15
-    w = np.where(down, 1.0, 1 + z)
-    upright = np.stack([1 - x * x / w, -x * y / w, x, -x * y / w, 1 - y * y / w, y, -x, -y, z], axis=-1)
+    level = x * x + y * y
+    down = (z < 0) & (level == 0)
+    # 1/(1 + z), which near −z keeps its digits as (1 − z)/(x² + y²).
+    w = np.where(z > 0, 1 / np.maximum(1 + z, 1.0), (1 - z) / np.where(level > 0, level, 1.0))
+    upright = np.stack([1 - x * x * w, -x * y * w, x, -x * y * w, 1 - y * y * w, y, -x, -y, z], axis=-1)
     upside_down = np.broadcast_to([1.0, 0, 0, 0, -1, 0, 0, 0, -1], upright.shape)
     frame = np.where(down[..., None], upside_down, upright)
     return np.asarray(frame.reshape(*np.shape(x), 3, 3))

@@ -179,7 +179,10 @@ def _stated_noise(noise: ArrayLike, resolution: float) -> Floats:
 
 def _constant(frequency: ArrayLike, lead: tuple[int, ...], middle: float) -> Frequency:
     """A stated frequency that does not drift."""
-    given = np.asarray(frequency, dtype=float)
+    try:
+        given = np.asarray(frequency, dtype=float)
+    except (TypeError, ValueError):
+        given = np.asarray(np.nan)
     if not np.all(np.isfinite(given) & (given > 0)):
         raise InputError(f"a rotation frequency must be a positive number in Hz, got {frequency!r}")
     return Frequency(np.array(np.broadcast_to(given, lead)), np.zeros(lead), np.zeros(lead), middle)
