@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from localization.paths import degrees_between, root_mean_square, unit
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from magfem.constants import MU_0
@@ -16,7 +17,6 @@ from magfem.localization.isolines import isoline_functions
 from magfem.localization.orientation import orientation
 from magfem.localization.published import localize_as_published
 from magfem.typing import Floats, Points, Vectors
-from tests.localization.paths import degrees_between, root_mean_square, unit
 
 TIMES = np.arange(600) / 20
 SENSOR = Sensor(noise=3e-6, resolution=1e-7)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from localization.paths import PAIR, degrees_between, unit
 from scipy.spatial.transform import RigidTransform
 
 from magfem.constants import MU_0
@@ -20,7 +21,6 @@ from magfem.localization import (
     simulated_samples,
     workspace,
 )
-from tests.localization.paths import PAIR, degrees_between, unit
 
 TIMES = np.arange(600) / 20
 MOMENT = 2.6e-3

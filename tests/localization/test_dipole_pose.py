@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from localization.turning_dipole import dipole_samples, pose_at
 from scipy.optimize import minimize
 
 from magfem.constants import MU_0
 from magfem.errors import InputError
 from magfem.localization import dipole_poses
 from magfem.typing import Floats, Vectors
-from tests.localization.turning_dipole import dipole_samples, pose_at
 
 MOMENT = 2.6e-3
 

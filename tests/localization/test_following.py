@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from localization.paths import PAIR, TIMES, degrees_between, helix, root_mean_square, seen, smooth_random
 
 from magfem.errors import InputError
 from magfem.localization import Belief, ProcessNoise, Rotor, as_rotor, follow, track
 from magfem.typing import Floats
-from tests.localization.paths import PAIR, TIMES, degrees_between, helix, root_mean_square, seen, smooth_random
 
 NOISE = ProcessNoise(3e-9, 3e-5)
 

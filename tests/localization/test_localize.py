@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from localization.paths import degrees_between
+from localization.turning_dipole import dipole_samples, pose_at
 from scipy.spatial.transform import RigidTransform, Rotation
 
 import magfem
@@ -13,8 +15,6 @@ from magfem.localization import Sensor, as_rotor, demodulate, localize, localize
 from magfem.localization.orientation import orientation, phase_of, upright_frame
 from magfem.localization.refinement import linearised, quadratures_at
 from magfem.localization.sensor import as_sensors
-from tests.localization.paths import degrees_between
-from tests.localization.turning_dipole import dipole_samples, pose_at
 
 TIMES = np.arange(60) / 20
 MOMENT = 2.6e-3

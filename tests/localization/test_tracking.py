@@ -6,12 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-
-from magfem.errors import InputError
-from magfem.localization import ProcessNoise, Rotor, as_rotor, track, windows
-from magfem.localization.motion import dynamics
-from magfem.typing import Points, Vectors
-from tests.localization.paths import (
+from localization.paths import (
     PAIR,
     TIMES,
     cube,
@@ -23,6 +18,11 @@ from tests.localization.paths import (
     smooth_random,
     unit,
 )
+
+from magfem.errors import InputError
+from magfem.localization import ProcessNoise, Rotor, as_rotor, track, windows
+from magfem.localization.motion import dynamics
+from magfem.typing import Points, Vectors
 
 COUNT = 120
 

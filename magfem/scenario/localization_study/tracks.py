@@ -172,12 +172,12 @@ def _followed(study: TrackStudy, name: str, position: Points, axis: Vectors, see
 
 
 def cubic(study: TrackStudy) -> tuple[Points, Vectors]:
-    """Seven edges of a cube above the sensors, its corners as near and as far as asked; the axis is held."""
-    # A cube of side a whose lower face is at height h: the lower corners are at √(h² + a²/2), the upper ones at
-    # √((h + a)² + a²/2) from the origin.
+    """Seven edges of a cube above the sensors, as near and as far as asked; the axis is held."""
+    # A cube of side a whose lower face is at height h: the middles of its lower edges are at √(h² + a²/4), the upper
+    # corners at √((h + a)² + a²/2) from the origin.
     a = study.farthest / 2
     for _ in range(60):
-        h = np.sqrt(study.nearest**2 - a**2 / 2)
+        h = np.sqrt(study.nearest**2 - a**2 / 4)
         a = np.sqrt(max(study.farthest**2 - a**2 / 2, 0.0)) - h
     low, high, s = h, h + a, a / 2
     corners = np.array(
