@@ -84,6 +84,7 @@ EXPECTED = {
         ),
         ("bound.untold == ('the offset of the sensor', 'the static field') and np.isinf(bound.condition)", True, 0),
         ("repr(float(found.sensors[0].offset[2])) in Path('calibrated.toml').read_text()", True, 0),
+        ("bound.axis / pose.axis_deviation", 1.0, 0.1),  # the pose states what the bound says
         ("samples.shape[0] * array.shape[0]", 1200, 0),
     ],
     "coil-systems.md": [
