@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from localization.turning_dipole import dipole_samples, pose_at
+from localization.dipole_field import dipole_samples, pose_at
 from scipy.optimize import minimize
 
 from magfem.constants import MU_0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from localization.paths import degrees_between
-from localization.turning_dipole import dipole_samples, pose_at
+from localization.dipole_field import dipole_samples, pose_at
 from scipy.spatial.transform import RigidTransform, Rotation
 
 import magfem
