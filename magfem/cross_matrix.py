@@ -6,11 +6,18 @@ import numpy as np
 
 from magfem.typing import Floats, Vectors
 
+# Row k holds [e_k]×: all of them, weighted, are one small product, several times faster than filling in six entries.
+_UNITS = np.array(
+    [[0, 0, 0, 0, 0, -1, 0, 1, 0], [0, 0, 1, 0, 0, 0, -1, 0, 0], [0, -1, 0, 1, 0, 0, 0, 0, 0]], dtype=float
+)
+
 
 def cross_matrix(a: Vectors) -> Floats:
     """[a]× (..., 3, 3) of vectors a (..., 3), for which [a]× b = a × b."""
-    x, y, z = np.moveaxis(np.asarray(a, dtype=float), -1, 0)
-    matrix = np.zeros((*x.shape, 3, 3))
-    matrix[..., 0, 1], matrix[..., 0, 2], matrix[..., 1, 2] = -z, y, -x
-    matrix[..., 1, 0], matrix[..., 2, 0], matrix[..., 2, 1] = z, -y, x
-    return matrix
+    given = np.asarray(a, dtype=float)
+    return np.asarray((given @ _UNITS).reshape(*given.shape, 3))
+
+
+def cross(a: Vectors, b: Vectors) -> Vectors:
+    """a × b (..., 3), for a few vectors several times faster than NumPy's."""
+    return np.asarray((cross_matrix(a) @ np.asarray(b, dtype=float)[..., None])[..., 0])

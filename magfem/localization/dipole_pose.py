@@ -34,6 +34,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from magfem.constants import MU_0
+from magfem.cross_matrix import cross
 from magfem.errors import InputError
 from magfem.typing import ArrayLike, Booleans, Floats, Points, Vectors
 
@@ -80,7 +81,7 @@ def dipole_poses(cosine: ArrayLike, sine: ArrayLike, moment: float) -> DipolePos
     clamped = ratio > 2.0
     s2 = np.where(clamped, (2 * s1 + s2) / 5, s2)
     u1, u2 = major / s1[..., None], minor / np.linalg.norm(minor, axis=-1)[..., None]
-    n = np.cross(u1, u2)
+    n = cross(u1, u2)
 
     cos2 = np.clip((ratio**2 - 1) / 3, 0.0, 1.0)
     # Both as roots: an arc cosine would lose half of the digits near 0 and 90 degrees.
@@ -105,15 +106,15 @@ def dipole_poses(cosine: ArrayLike, sine: ArrayLike, moment: float) -> DipolePos
 
 def _frames(towards: Vectors, C: Vectors, S: Vectors) -> Floats:
     """Orientations (..., 3, 3) from directions p̂ (..., 3): M undone on C and S, and made orthonormal."""
-    across = np.cross(C, S)
+    across = cross(C, S)
     axis = 3 * _along(towards, across) * towards - across
     axis /= np.linalg.norm(axis, axis=-1, keepdims=True)
     x = 1.5 * _along(towards, C) * towards - C
     y = 1.5 * _along(towards, S) * towards - S
-    x = x + np.cross(y, axis)  # y × â = x for an exact pair; else the nearest orthonormal pair lies between both
+    x = x + cross(y, axis)  # y × â = x for an exact pair; else the nearest orthonormal pair lies between both
     x -= _along(axis, x) * axis
     x /= np.linalg.norm(x, axis=-1, keepdims=True)
-    return np.stack([x, np.cross(axis, x), axis], axis=-1)
+    return np.stack([x, cross(axis, x), axis], axis=-1)
 
 
 def _along(a: Vectors, b: Vectors) -> Floats:

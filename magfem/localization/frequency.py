@@ -136,9 +136,8 @@ def _start(b: Floats, t: Floats, used: Booleans, near: ArrayLike | None, drift: 
     most = _MOST_DRIFTS if drift else 0
     drifts = np.asarray(np.arange(-most, most + 1) * 2.0 / span**2, dtype=np.float64)
     if near is None:
-        lines = _lines(t, None)
-        waves = _waves(lines, tau)
-        power = np.stack([_power(b, used, waves, chirp) for chirp in _chirps(tau, drifts)], axis=-2)
+        found = [_all_lines(b, t, used, chirp) for chirp in _chirps(tau, drifts)]
+        lines, power = found[0][0], np.stack([one[1] for one in found], axis=-2)
         best = power.reshape(*lead, -1).argmax(axis=-1)  # of drifts × lines
         return lines[best % lines.size], drifts[best // lines.size]
     start = np.array(np.broadcast_to(np.asarray(near, dtype=float), lead))
@@ -157,6 +156,24 @@ def _start(b: Floats, t: Floats, used: Booleans, near: ArrayLike | None, drift: 
         np.take_along_axis(lines.reshape(*lead, -1), best[..., None], axis=-1)[..., 0],
         drifts[best // about.size],
     )
+
+
+def _all_lines(b: Floats, t: Floats, used: Booleans, chirp: Complexes | None = None) -> tuple[Floats, Floats]:
+    """Lines (f,) Hz up to half the mean rate, four to each 1/(time sampled), and their power (..., f) T².
+
+    Of evenly sampled records by a fast Fourier transform.
+    """
+    lines = _lines(t, None)
+    interval = np.ptp(t) / (t.size - 1)
+    if not np.allclose(np.diff(t), interval, rtol=1e-6, atol=0):
+        return lines, _power(b, used, _waves(lines, t - t.mean()), chirp)
+    padded = _PER_LINE * t.size
+    count = np.maximum(used.sum(axis=-2, keepdims=True), 1)
+    centred = np.where(used, b - b.sum(axis=-2, keepdims=True) / count, 0.0)
+    amplitude = np.fft.fft(centred if chirp is None else centred * chirp[:, None], padded, axis=-2)
+    frequencies = np.arange(_PER_LINE, padded // 2) / (padded * interval)  # from one turn in the time sampled
+    power = 2 * np.sum(np.abs(amplitude[..., _PER_LINE : padded // 2, :]) ** 2 / count**2, axis=-1)
+    return frequencies, np.asarray(power)
 
 
 def _waves(lines: Floats, tau: Floats) -> Complexes:

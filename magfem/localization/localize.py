@@ -27,6 +27,9 @@ STARTING_SENSORS = 3
 AS_LIKELY = 3.0
 """Branches are about as likely when their log likelihoods differ by less: a factor of twenty."""
 
+GIVEN_UP = 100.0
+"""Above the least misfit, in squared deviations: branches as far behind are not followed to their end."""
+
 PLAUSIBLE = 10.0
 """Within this log likelihood of the best a branch may be preferred for lying near where the rotor was."""
 
@@ -177,7 +180,7 @@ def _located(
     measured = whitened(fields, array)
     position, frame, clamped = _starts(measured, rotor, array)
     repeated = Measured(measured.quadratures[..., None, :, :], measured.whitening[..., None, :, :, :])
-    refined = refine(rotor, array, repeated, position, frame)
+    refined = refine(rotor, array, repeated, position, frame, GIVEN_UP)
     pose = _pose(fields, rotor, array, measured, refined, clamped, near)
     if strict and not pose.converged.all():
         raise ConvergenceError(
@@ -232,6 +235,9 @@ def _pose(
     log_determinant = -2 * np.log(np.abs(np.einsum("...saa->...sa", measured.whitening))).sum(axis=(-2, -1))
     constant = -0.5 * (log_determinant + 6 * len(fields) * np.log(2 * np.pi))
     log_likelihood = constant[..., None] - 0.5 * refined.misfit
+    # What was given up is no branch; where nothing converged, all that there is must do.
+    ended = refined.converged | ~refined.converged.any(axis=-1, keepdims=True)
+    log_likelihood = np.where(ended, log_likelihood, -np.inf)
     order, distinct = _ranked(refined, log_likelihood, near)
     kept = int(min(MOST_BRANCHES, distinct.sum(axis=-1).max()))
     order, distinct = order[..., :kept], np.take_along_axis(distinct, order, axis=-1)[..., :kept]
@@ -299,7 +305,7 @@ def _ranked(refined: Refined, log_likelihood: Floats, near: ArrayLike | Branch |
     size = np.linalg.norm(sorted_position, axis=-1)[..., :, None]
     same = np.linalg.norm(sorted_position[..., :, None, :] - sorted_position[..., None, :, :], axis=-1) < 1e-4 * size
     same &= np.linalg.norm(sorted_axis[..., :, None, :] - sorted_axis[..., None, :, :], axis=-1) < 1e-3
-    repeated = np.any(np.tril(same, -1), axis=-1)
+    repeated = np.any(np.tril(same, -1), axis=-1) | np.isinf(np.take_along_axis(log_likelihood, order, axis=-1))
     # Repetitions go to the end.
     last = np.argsort(repeated, axis=-1, kind="stable")
     order = np.take_along_axis(order, last, axis=-1)

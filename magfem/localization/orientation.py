@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from magfem.cross_matrix import cross_matrix
 from magfem.typing import ArrayLike, Floats, Vectors
 
 
@@ -41,8 +42,6 @@ def phase_of(frame: Floats) -> Floats:
 
 def rotation_matrix(vector: Vectors) -> Floats:
     """(..., 3, 3) of rotation vectors (..., 3) rad, by Rodrigues' formula."""
-    angle = np.linalg.norm(vector, axis=-1)[..., None, None]
-    x, y, z = np.moveaxis(vector, -1, 0)
-    zero = np.zeros_like(x)
-    K = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(*x.shape, 3, 3)
+    angle = np.sqrt(np.einsum("...i,...i->...", vector, vector))[..., None, None]
+    K = cross_matrix(vector)
     return np.asarray(np.eye(3) + np.sinc(angle / np.pi) * K + 0.5 * np.sinc(angle / (2 * np.pi)) ** 2 * (K @ K))

@@ -30,6 +30,7 @@ is the square of a negligible one: Gauss–Newton converges quadratically there.
 
 PATIENCE = 50  # steps after which a thousand times that gain counts as none: valleys of wrong branches are long
 LIGHT = 1e-3  # damping below which a step with little gain tells of a minimum, not of the damping
+HOPEFUL, FALLING = 6, 0.1  # steps before a candidate is given up; share of what it is behind that a step must gain
 FIRST_DAMPING = 1e-4  # of the mean of the normal matrix' diagonal
 LONGEST_STEP = 0.3  # of the distance, and rad
 CLOSEST = 1e-3  # of the first distance: nothing comes nearer to a sensor
@@ -62,10 +63,19 @@ class Refined:
     iterations: Integers
 
 
-def refine(rotor: Rotor, array: SensorArray, measured: Measured, position: Points, frame: Floats) -> Refined:
+def refine(
+    rotor: Rotor,
+    array: SensorArray,
+    measured: Measured,
+    position: Points,
+    frame: Floats,
+    give_up: float = np.inf,
+) -> Refined:
     """The poses nearest to the starts `position` (..., 3) m, `frame` (..., 3, 3) that explain `measured` best.
 
-    The leading axes of `measured` and of the starts must be the same.
+    The leading axes of `measured` broadcast to those of the starts, whose last are candidates of one pose.  give_up: a
+    candidate whose misfit is by so much above that of another which has converged, and hardly falls, is left where it
+    is, not converged.
     """
     lead = position.shape[:-1]
     count = int(np.prod(lead))
@@ -80,6 +90,8 @@ def refine(rotor: Rotor, array: SensorArray, measured: Measured, position: Point
     damping, growth = np.full(count, FIRST_DAMPING), np.full(count, 2.0)
     converged, iterations = np.zeros(count, dtype=bool), np.zeros(count, dtype=np.int64)
     active = np.arange(count)
+    rivals = np.full((max(count // lead[-1], 1) if lead else 1), np.inf)  # the least misfit that has converged, by pose
+    pose_of = np.arange(count) // (lead[-1] if lead else 1)
     for _ in range(MOST_ITERATIONS):
         size = np.ones((active.size, 6))
         size[:, :3] = scale[active, None]
@@ -103,7 +115,9 @@ def refine(rotor: Rotor, array: SensorArray, measured: Measured, position: Point
         little = np.where(iterations[active] < PATIENCE, NEGLIGIBLE, 1e3 * NEGLIGIBLE)
         flat = better & (gain < np.maximum(little, 1e-14 * tried)) & (damping[active] <= LIGHT)
         stuck = ~better & (damping[active] > 1e8)
-        done = small | flat | stuck
+        behind = misfit[active] - rivals[pose_of[active]]
+        hopeless = (behind > give_up) & (gain < FALLING * behind) & (iterations[active] >= HOPEFUL)
+        done = small | flat | stuck | hopeless
         taken = active[better]
         p[taken], R[taken], misfit[taken] = tried_p[better], tried_R[better], tried[better]
         J[better], residual[better] = tried_J[better], tried_residual[better]
@@ -114,9 +128,10 @@ def refine(rotor: Rotor, array: SensorArray, measured: Measured, position: Point
         damping[active] = np.where(better, np.maximum(less, 1e-15), growth[active] * damping[active])
         growth[active] = np.where(better, 2.0, 2 * growth[active])
         iterations[active] += 1
-        converged[active[done & ~stuck]] = True
         # Rejected small steps end at a minimum as well: rounding is all that is left.
-        converged[active[stuck & (length < 1e-6)]] = True
+        ended = small | flat | (stuck & (length < 1e-6))
+        converged[active[ended]] = True
+        np.minimum.at(rivals, pose_of[active[ended]], misfit[active[ended]])
         if done.all():
             break
         keep = ~done
@@ -158,19 +173,17 @@ def linearised(
 ) -> tuple[Floats, Floats]:
     """Whitened J (n, 6s, 6) and residuals (n, 6s) of poses (n, 3), (n, 3, 3)."""
     modelled, J = _modelled(rotor, array, p, R)
-    residual = np.einsum("nsab,nsb->nsa", weight, modelled - target)
+    residual = (weight @ (modelled - target)[..., None])[..., 0]
     return (weight @ J).reshape(len(p), -1, 6), residual.reshape(len(p), -1)
 
 
 def _modelled(rotor: Rotor, array: SensorArray, p: Points, R: Floats) -> tuple[Floats, Floats]:
     """Quadratures (n, s, 6) in the sensors' frames and J (n, s, 6, 6), all motions in the rotor's frame."""
-    q = np.einsum("nij,nsi->nsj", R, array.positions - p[:, None, :])
-    C, S, dC, dS = rotor.quadratures(q)
-    turn = np.einsum("sij,nik->nsjk", array.axes, R)  # from the rotor's frame to the sensors'
-    cross = cross_matrix(q)
-    values, J = np.empty((*q.shape[:2], 6)), np.empty((*q.shape[:2], 6, 6))
-    for rows, B, G in ((slice(0, 3), C, dC), (slice(3, 6), S, dS)):
-        values[..., rows] = np.einsum("nsij,nsj->nsi", turn, B)
-        J[..., rows, :3] = -turn @ G
-        J[..., rows, 3:] = turn @ (G @ cross - cross_matrix(B))
-    return values, J
+    q = (array.positions - p[:, None, :]) @ R
+    B, G = rotor.stacked_quadratures(q)  # (n, s, 2, 3), (n, s, 2, 3, 3)
+    turn = (np.swapaxes(array.axes, -1, -2) @ R[:, None])[:, :, None]  # from the rotor's frame to the sensors'
+    J = np.empty((*B.shape, 6))
+    J[..., :3] = -G
+    J[..., 3:] = G @ cross_matrix(q)[:, :, None] - cross_matrix(B)
+    shape = (*q.shape[:2], 6)
+    return (turn @ B[..., None]).reshape(shape), (turn @ J).reshape(*shape, 6)

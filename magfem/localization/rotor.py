@@ -22,7 +22,8 @@ from magfem.fields.terms import Terms, frame_about
 from magfem.fitting import load_model
 from magfem.typing import ArrayLike, Floats, Points, Tensors, Vectors
 
-_QUARTER = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+_FORTH = np.array([np.eye(3), [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]])  # no turn, a quarter turn
+_BACK = np.swapaxes(_FORTH, -1, -2)
 _FEWEST_COPIES = 16
 _ON_AXIS = 1e-12  # of sines and of m
 
@@ -51,9 +52,14 @@ class Rotor:
 
         Whatever the region: harmonics fall off as they should beyond it, and `Pose.inside` tells.
         """
-        stacked = np.stack([points, points @ _QUARTER])  # rows: the second is Rᵀ p
-        B, gradient = self.turning.jet(stacked, 1, outside="extrapolate")
-        return B[0], B[1] @ _QUARTER.T, gradient[0], _QUARTER @ gradient[1] @ _QUARTER.T
+        B, gradient = self.stacked_quadratures(points)
+        return B[..., 0, :], B[..., 1, :], gradient[..., 0, :, :], gradient[..., 1, :, :]
+
+    def stacked_quadratures(self, points: Points) -> tuple[Vectors, Tensors]:
+        """The same as two arrays: C and S (..., 2, 3) T, and their gradients (..., 2, 3, 3) T/m."""
+        seen = (_BACK @ points[..., None, :, None])[..., 0]  # S is C turned by a quarter: where C is looked at for it
+        B, gradient = self.turning.jet(seen, 1, outside="extrapolate")
+        return (_FORTH @ B[..., None])[..., 0], _FORTH @ gradient @ _BACK
 
     def steady(self, points: Points) -> tuple[Vectors, Tensors]:
         """b₀ (..., 3) T at `points` (..., 3) m of the rotor's frame, the mean over a turn, and its gradient T/m.

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from localization.paths import degrees_between
 from localization.dipole_field import dipole_samples, pose_at
+from localization.paths import degrees_between
 from scipy.spatial.transform import RigidTransform, Rotation
 
 import magfem
