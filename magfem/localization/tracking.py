@@ -31,14 +31,14 @@ from magfem.typing import ArrayLike, Booleans, Floats, Points, Vectors
 
 log = logging.getLogger("magfem")
 
-MOST_ITERATIONS = 40
-SMALL_CHANGE = 1e-6  # of the distance, and rad
+MOST_ITERATIONS = 80
+SMALL_CHANGE = 1e-5  # of the distance, and rad
 FAULTY = 1e-4  # probability of a window's misfit below which it is told from the track
 FEWEST_SAMPLES = 6  # of an axis in a window
 ALTERNATIVES = 4
 NEVER = 1e9  # cost of a branch that is none
 HOPELESS = 100.0  # cost of a path above the best beyond which it is not followed
-SETTLED = 3  # iterations after which the process noise changes little
+SETTLED, FROZEN = 3, 8  # iterations after which the process noise changes little, and is left as it is
 START = ProcessNoise(1e-8, 1e-5)
 DECADES = 1.5
 """Deviation of the logarithms of process noise before anything was measured. Short tracks alone often prefer none, and
@@ -235,10 +235,10 @@ def _follow(
     while True:
         measured, phase = likelihoods(seen, p, R, weight)
         motion = dynamics(np.diff(times), R[:-1, :, 2], spin[:-1])
-        if noise is None:
+        if noise is None and iterations < FROZEN:  # on grids it would go on jumping, and the track with it
             used = _process_noise(measured, motion, used, iterations)
         found = smooth(measured, motion, used)
-        spin = found.state[:, 9:]
+        spin = 0.5 * (spin + found.state[:, 9:])  # halfway: what is not observed would swing about
         if change < SMALL_CHANGE or iterations == MOST_ITERATIONS:
             break
         p, R, changes = moved(seen, p, R, found.state, phase)
