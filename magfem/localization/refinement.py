@@ -30,7 +30,7 @@ is the square of a negligible one: Gauss–Newton converges quadratically there.
 
 PATIENCE = 50  # steps after which a thousand times that gain counts as none: valleys of wrong branches are long
 LIGHT = 1e-3  # damping below which a step with little gain tells of a minimum, not of the damping
-HOPEFUL, FALLING = 6, 0.1  # steps before a candidate is given up; share of what it is behind that a step must gain
+HOPEFUL, FALLING = 3, 0.5  # steps before a candidate is given up; share of what it is behind that a step must gain
 FIRST_DAMPING = 1e-4  # of the mean of the normal matrix' diagonal
 LONGEST_STEP = 0.3  # of the distance, and rad
 CLOSEST = 1e-3  # of the first distance: nothing comes nearer to a sensor
