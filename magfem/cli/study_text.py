@@ -15,4 +15,5 @@ def text(data: dict[str, Any], folder: str) -> str:
         rows.append((one["quantity"], f"{one['found']:.3g} {one['unit']}".rstrip(), one["published"], limit))
     limited = [one for one in data["comparisons"] if one["limit"]]
     kept = sum(one["holds"] for one in limited)
-    return f"{data['name']}\n{table(rows)}\n  {kept} of {len(limited)} limits kept\n  all of it in {folder}"
+    told = f"  {kept} of {len(limited)} limits kept\n" if limited else ""
+    return f"{data['name']}\n{table(rows)}\n{told}  all of it in {folder}"

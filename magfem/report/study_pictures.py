@@ -227,10 +227,15 @@ def stator(found: StatorResult) -> list[Picture]:
         left, right = drawn.subplots(1, 2, width_ratios=[2.2, 1.0], sharey=True)
         for k, (name, colour) in enumerate((("x", BLUE), ("y", ORANGE), ("z", GREEN))):
             left.plot(found.times, MICRO * found.signal[:, k], color=colour, linewidth=0.7, label=f"b$_{name}$")
-        right.hist(MICRO * found.signal.ravel(), bins=40, orientation="horizontal", color=GREY)
+        step = (
+            2 * MICRO * found.study.noise.resolution or 0.2
+        )  # two steps of the readings: else bars would beat with them
+        values = MICRO * found.signal.ravel()
+        bins = np.arange(values.min(), values.max() + step, step)
+        right.hist(values, bins=bins, orientation="horizontal", color=GREY)
         left.set(xlabel="time (s)", ylabel="field less its mean (µT)")
         right.set(xlabel="samples")
-        left.legend(ncols=3, loc="upper right")
+        left.legend(ncols=3, loc="lower right", bbox_to_anchor=(1, 1))
         content = png(drawn)
     noise = Picture(
         "sensor_noise",
