@@ -19,6 +19,7 @@ from magfem.localization.rotor import Rotor, as_rotor
 from magfem.localization.sensor import Sensor
 from magfem.localization.signal import RotatingField, demodulate, demodulate_several
 from magfem.localization.simulated import simulated_samples
+from magfem.localization.synchrony import Synchrony, synchrony
 from magfem.localization.tracking import Track, track, windows
 
 __all__ = [
@@ -37,6 +38,7 @@ __all__ = [
     "Sensor",
     "SensorDeviation",
     "Spectrum",
+    "Synchrony",
     "Track",
     "Workspace",
     "as_rotor",
@@ -56,6 +58,7 @@ __all__ = [
     "reach",
     "simulated_samples",
     "spectrum",
+    "synchrony",
     "track",
     "windows",
     "workspace",
