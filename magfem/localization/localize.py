@@ -51,7 +51,7 @@ def localize(
     samples: (..., n, 3) T of one sensor, in its frame; (..., s, n, 3) of a sequence of s sensors. NaN are missing.
     times: (n,) s; or (s, n), one sensor that is moved from place to place while the magnet goes on turning.
     model: of the magnet's field: a model, its name or file, or a `Rotor`.  frequency: Hz; None to find it.
-    sensors: None, one, or a sequence: of `Sensor`, or of poses in the common frame.
+    sensors: None, one, or a sequence: of `Sensor`, of poses in the common frame, or of places (3,) m in it.
     near: where the rotor is about, (..., 3) m, or an earlier or expected pose: the branch closest to it is taken among
     those that are about as likely. Without it, one sensor's branch is the one with z > 0 and the axis nearest to +z.
     rotation_axis: (3,), in the model's frame.  drift: the frequency changes steadily, from near `frequency`.

@@ -56,8 +56,9 @@ class Sensor:
         return np.asarray(B @ np.asarray(self.gain).T + self.offset)
 
 
-Sensors: TypeAlias = Sensor | RigidTransform | Sequence[Sensor | RigidTransform] | None
-"""One sensor or several; a pose stands for a sensor of which nothing else is known, None for one at the origin."""
+Sensors: TypeAlias = Sensor | RigidTransform | Sequence[Sensor | RigidTransform | Sequence[float]] | Floats | None
+"""One sensor or several. A pose, or a place (3,) m, stands for a sensor of which nothing else is known; places (s, 3) m
+for several, their axes those of the common frame; None for one at the origin."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,13 +78,16 @@ class SensorArray:
 def as_sensors(sensors: Sensors) -> SensorArray:
     """Sensors as arrays. Raises InputError for what are none."""
     if sensors is None:
-        sensors = Sensor()
-    if isinstance(sensors, RigidTransform) and not sensors.single:
-        sensors = list(sensors)
-    several = [sensors] if isinstance(sensors, Sensor | RigidTransform) else list(sensors)
-    found = tuple(Sensor(pose=one) if isinstance(one, RigidTransform) else one for one in several)
-    if not found or not all(isinstance(one, Sensor) for one in found):
-        raise InputError("sensors must be a Sensor, a RigidTransform, or a sequence of these")
+        return as_sensors(Sensor())
+    if isinstance(sensors, Sensor | RigidTransform):
+        sensors = [sensors] if is_one(sensors) else list(sensors)  # type: ignore[arg-type]
+    elif isinstance(sensors, str) or np.ndim(np.asarray(sensors, dtype=object)) == 0:
+        raise _no_sensors()
+    elif is_one(sensors):
+        sensors = [sensors]
+    found = tuple(_as_sensor(one) for one in sensors)
+    if not found:
+        raise _no_sensors()
     return SensorArray(
         found,
         np.array([one.pose.translation for one in found]),
@@ -91,6 +95,28 @@ def as_sensors(sensors: Sensors) -> SensorArray:
     )
 
 
+def _as_sensor(one: object) -> Sensor:
+    if isinstance(one, Sensor):
+        return one
+    if isinstance(one, RigidTransform):
+        return Sensor(pose=one)
+    try:
+        place = np.asarray(one, dtype=float)
+    except (TypeError, ValueError):
+        raise _no_sensors() from None
+    if place.shape != (3,) or not np.isfinite(place).all():
+        raise _no_sensors()
+    return Sensor(pose=RigidTransform.from_translation(place))
+
+
+def _no_sensors() -> InputError:
+    return InputError("sensors must be a Sensor, a pose (RigidTransform), a place (3,) in m, or a sequence of these")
+
+
 def is_one(sensors: Sensors) -> bool:
     """Whether `sensors` stands for one sensor, whose samples have no axis of sensors."""
-    return sensors is None or isinstance(sensors, Sensor) or (isinstance(sensors, RigidTransform) and sensors.single)
+    if isinstance(sensors, RigidTransform):
+        return bool(sensors.single)
+    if sensors is None or isinstance(sensors, Sensor):
+        return True
+    return len(sensors) == 3 and all(isinstance(one, float | int | np.number) for one in sensors)

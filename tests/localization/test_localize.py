@@ -141,6 +141,16 @@ def test_several_sensors_turned_and_apart_need_no_prior() -> None:
     assert not pose.ambiguous and not pose.singular
 
 
+def test_places_stand_for_sensors() -> None:
+    """(s, 3) m, or one (3,), as lists or arrays: sensors turned as the common frame."""
+    places = [[0.0, 0.0, 0.0], [0.02, 0.0, 0.0]]
+    seen = np.stack([dipole_samples(POSITION, AXIS, TIMES, 1.0, MOMENT, sensor=at) for at in places])
+    for given in (places, np.array(places), [RigidTransform.from_translation(at) for at in places]):
+        np.testing.assert_allclose(localize(seen, TIMES, DIPOLE, 1.0, given).position, POSITION, atol=1e-10)
+    one = localize(seen[1], TIMES, DIPOLE, 1.0, places[1], near=POSITION)
+    np.testing.assert_allclose(one.position, POSITION, atol=1e-10)
+
+
 def test_gain_and_offset_are_undone() -> None:
     gain = np.array([[1.1, 0.02, 0.0], [-0.03, 0.95, 0.01], [0.0, 0.04, 1.05]])
     sensor = Sensor(gain=gain, offset=[1e-5, 2e-5, -3e-5])
