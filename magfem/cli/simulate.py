@@ -24,7 +24,6 @@ def add(commands: CommandLine) -> None:
         "not kept.",
         [
             "magfem simulate steer_planar -o steering",
-            "magfem simulate steer_own_coils -o steering --json",
             "magfem simulate localize_and_steer -o motor",
             "magfem simulate localize_tracks -o tracks",
             "magfem simulate ./mine.toml -o mine --no-pictures",
