@@ -45,3 +45,13 @@ def rotation_matrix(vector: Vectors) -> Floats:
     angle = np.sqrt(np.einsum("...i,...i->...", vector, vector))[..., None, None]
     K = cross_matrix(vector)
     return np.asarray(np.eye(3) + np.sinc(angle / np.pi) * K + 0.5 * np.sinc(angle / (2 * np.pi)) ** 2 * (K @ K))
+
+
+def small_turn(vector: Vectors) -> Floats:
+    """(..., 3, 3) rotations of small rotation vectors (..., 3) rad, by Cayley's map.
+
+    Exactly rotations, by 2 atan(½ |v|) about v: that of the vector itself up to its third power, without a sine.
+    """
+    K = cross_matrix(vector)
+    square = np.einsum("...i,...i->...", vector, vector)[..., None, None]
+    return np.asarray(np.eye(3) + (K + 0.5 * (K @ K)) / (1 + 0.25 * square))

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from magfem.cross_matrix import cross_matrix
-from magfem.localization.orientation import rotation_matrix
+from magfem.localization.orientation import small_turn
 from magfem.localization.rotor import Rotor
 from magfem.localization.sensor import SensorArray
 from magfem.typing import Booleans, Floats, Integers, Points
@@ -33,6 +33,7 @@ LIGHT = 1e-3  # damping below which a step with little gain tells of a minimum, 
 HOPEFUL, FALLING = 3, 0.5  # steps before a candidate is given up; share of what it is behind that a step must gain
 FIRST_DAMPING = 1e-4  # of the mean of the normal matrix' diagonal
 LONGEST_STEP = 0.3  # of the distance, and rad
+_ONE = np.eye(6)
 CLOSEST = 1e-3  # of the first distance: nothing comes nearer to a sensor
 
 
@@ -82,72 +83,120 @@ def refine(
     p, R = position.reshape(-1, 3).copy(), frame.reshape(-1, 3, 3).copy()
     target = np.broadcast_to(measured.quadratures, (*lead, *measured.quadratures.shape[-2:])).reshape(count, -1, 6)
     weight = np.broadcast_to(measured.whitening, (*lead, *measured.whitening.shape[-3:])).reshape(count, -1, 6, 6)
-    scale = np.linalg.norm(p[:, None, :] - array.positions, axis=-1).min(axis=-1)
-    least = CLOSEST * scale
+    misfit, converged, iterations = np.empty(count), np.zeros(count, dtype=bool), np.zeros(count, dtype=np.int64)
+    group = np.arange(count) // (lead[-1] if lead else 1)  # candidates of one pose
+    least = np.full(group[-1] + 1 if count else 0, np.inf)  # the least misfit that has converged, by pose
 
-    J, residual = linearised(rotor, array, p, R, target, weight)
-    misfit = np.einsum("ni,ni->n", residual, residual)
+    # Below, arrays are of the candidates under way: `going` are their numbers.
+    going = np.arange(count)
+    now = _Candidates(p, R, *linearised(rotor, array, p, R, target, weight))
+    distance = _distance(p, array)
+    size = np.concatenate([np.repeat(distance[:, None], 3, axis=1), np.ones((count, 3))], axis=1)  # of what is a step
+    closest = CLOSEST * distance
     damping, growth = np.full(count, FIRST_DAMPING), np.full(count, 2.0)
-    converged, iterations = np.zeros(count, dtype=bool), np.zeros(count, dtype=np.int64)
-    active = np.arange(count)
-    rivals = np.full((max(count // lead[-1], 1) if lead else 1), np.inf)  # the least misfit that has converged, by pose
-    pose_of = np.arange(count) // (lead[-1] if lead else 1)
-    for _ in range(MOST_ITERATIONS):
-        size = np.ones((active.size, 6))
-        size[:, :3] = scale[active, None]
-        scaled = J * size[:, None, :]
-        normal = np.einsum("nki,nkj->nij", scaled, scaled)
-        gradient = np.einsum("nki,nk->ni", scaled, residual)
-        spread = np.einsum("nii->n", normal) / 6  # one scale for all: small pivots are just what damping is for
-        step = -np.linalg.solve(normal + (damping[active] * spread)[:, None, None] * np.eye(6), gradient[..., None])[
-            ..., 0
-        ]
-        length = np.abs(step).max(axis=-1)
-        step *= np.minimum(1.0, LONGEST_STEP / np.maximum(length, 1e-300))[:, None]
-        tried_p = p[active] + scale[active, None] * np.einsum("nij,nj->ni", R[active], step[:, :3])
-        tried_R = R[active] @ rotation_matrix(step[:, 3:])
-        tried_J, tried_residual = linearised(rotor, array, tried_p, tried_R, target[active], weight[active])
-        tried = np.einsum("ni,ni->n", tried_residual, tried_residual)
-        near = np.linalg.norm(tried_p[:, None, :] - array.positions, axis=-1).min(axis=-1)
-        better = (tried <= misfit[active]) & (near > least[active])
-        gain = misfit[active] - tried
+    for iteration in range(MOST_ITERATIONS):
+        normal, gradient, value = now.normal_equations(size)
+        step, length = _damped_step(normal, gradient, damping)
+        moved = now.moved(step * size)
+        tried = _Candidates(*moved, *linearised(rotor, array, *moved, target[going], weight[going]))
+        tried_value = np.einsum("ni,ni->n", tried.residual, tried.residual)
+        better = (tried_value <= value) & (_distance(moved[0], array) > closest)
+        gain = value - tried_value
         small = length < SMALL_STEP
-        little = np.where(iterations[active] < PATIENCE, NEGLIGIBLE, 1e3 * NEGLIGIBLE)
-        flat = better & (gain < np.maximum(little, 1e-14 * tried)) & (damping[active] <= LIGHT)
-        stuck = ~better & (damping[active] > 1e8)
-        behind = misfit[active] - rivals[pose_of[active]]
-        hopeless = (behind > give_up) & (gain < FALLING * behind) & (iterations[active] >= HOPEFUL)
+        little = NEGLIGIBLE if iteration < PATIENCE else 1e3 * NEGLIGIBLE
+        flat = better & (gain < np.maximum(little, 1e-14 * tried_value)) & (damping <= LIGHT)
+        stuck = ~better & (damping > 1e8)
+        behind = value - least[group[going]]
+        hopeless = (behind > give_up) & (gain < FALLING * behind) & (iteration >= HOPEFUL)
+
+        now = now.replaced(better, tried)
+        value = np.where(better, tried_value, value)
+        damping, growth = _next_damping(damping, growth, better, gain, step, normal, gradient)
         done = small | flat | stuck | hopeless
-        taken = active[better]
-        p[taken], R[taken], misfit[taken] = tried_p[better], tried_R[better], tried[better]
-        J[better], residual[better] = tried_J[better], tried_residual[better]
-        # Nielsen's rule: less damping the better the linear prediction was, and ever more when steps fail.
-        predicted = -np.einsum("ni,ni->n", step, 2 * gradient + np.einsum("nij,nj->ni", normal, step))
-        ratio = np.clip(gain / np.maximum(predicted, 1e-300), -1.0, 1.0)
-        less = damping[active] * np.maximum(0.1, 1 - (2 * ratio - 1) ** 3)
-        damping[active] = np.where(better, np.maximum(less, 1e-15), growth[active] * damping[active])
-        growth[active] = np.where(better, 2.0, 2 * growth[active])
-        iterations[active] += 1
-        # Rejected small steps end at a minimum as well: rounding is all that is left.
-        ended = small | flat | (stuck & (length < 1e-6))
-        converged[active[ended]] = True
-        np.minimum.at(rivals, pose_of[active[ended]], misfit[active[ended]])
-        if done.all():
-            break
-        keep = ~done
-        active, J, residual = active[keep], J[keep], residual[keep]
+        if done.any() or iteration == MOST_ITERATIONS - 1:
+            p[going], R[going], misfit[going], iterations[going] = now.position, now.frame, value, iteration + 1
+            # Rejected small steps end at a minimum as well: rounding is all that is left.
+            ended = small | flat | (stuck & (length < 1e-6))
+            converged[going[ended]] = True
+            np.minimum.at(least, group[going[ended]], value[ended])
+            keep = ~done
+            if not keep.any():
+                break
+            going, now, size, closest = going[keep], now.only(keep), size[keep], closest[keep]
+            damping, growth = damping[keep], growth[keep]
     U, _, V = np.linalg.svd(R)
     R = U @ V  # many small turns leave a matrix that is a rotation to a few roundings
     J, _ = linearised(rotor, array, p, R, target, weight)
-    J[..., :3] = np.einsum("nkj,nij->nki", J[..., :3], R)  # from the rotor's frame to the common one
+    J[..., :3] = J[..., :3] @ np.swapaxes(R, -1, -2)  # from the rotor's frame to the common one
     return Refined(
         position=p.reshape(*lead, 3),
         frame=R.reshape(*lead, 3, 3),
         misfit=misfit.reshape(lead),
-        information=np.einsum("nki,nkj->nij", J, J).reshape(*lead, 6, 6),
+        information=(np.swapaxes(J, -1, -2) @ J).reshape(*lead, 6, 6),
         converged=converged.reshape(lead),
         iterations=iterations.reshape(lead),
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Candidates:
+    """Poses (n, 3), (n, 3, 3) with their whitened J (n, m, 6) and residuals (n, m)."""
+
+    position: Points
+    frame: Floats
+    J: Floats
+    residual: Floats
+
+    def normal_equations(self, size: Floats) -> tuple[Floats, Floats, Floats]:
+        """JᵀJ (n, 6, 6) and Jᵀr (n, 6) for steps in units of `size` (n, 6), and rᵀr (n,): one product for all."""
+        both = np.concatenate([self.J * size[:, None, :], self.residual[..., None]], axis=-1)
+        product = np.swapaxes(both, -1, -2) @ both
+        return product[:, :6, :6], product[:, :6, 6], product[:, 6, 6]
+
+    def moved(self, step: Floats) -> tuple[Points, Floats]:
+        """The poses after steps (n, 6) m and rad in their own frames."""
+        place = self.position + (self.frame @ step[:, :3, None])[..., 0]
+        return place, self.frame @ small_turn(step[:, 3:])
+
+    def replaced(self, better: Booleans, other: _Candidates) -> _Candidates:
+        """Those of `other` where they are better."""
+        if better.all():
+            return other
+        whole = better[:, None, None]
+        return _Candidates(
+            np.where(better[:, None], other.position, self.position),
+            np.where(whole, other.frame, self.frame),
+            np.where(whole, other.J, self.J),
+            np.where(better[:, None], other.residual, self.residual),
+        )
+
+    def only(self, keep: Booleans) -> _Candidates:
+        return _Candidates(self.position[keep], self.frame[keep], self.J[keep], self.residual[keep])
+
+
+def _damped_step(normal: Floats, gradient: Floats, damping: Floats) -> tuple[Floats, Floats]:
+    """Steps (n, 6), no longer than is safe, and how long (n,) they would have been."""
+    # One scale for all six: small pivots are just what damping is for.
+    spread = np.einsum("nii->n", normal) * (damping / 6)
+    step = -np.linalg.solve(normal + spread[:, None, None] * _ONE, gradient[..., None])[..., 0]
+    length = np.abs(step).max(axis=-1)
+    return step * np.minimum(1.0, LONGEST_STEP / np.maximum(length, 1e-300))[:, None], length
+
+
+def _next_damping(
+    damping: Floats, growth: Floats, better: Booleans, gain: Floats, step: Floats, normal: Floats, gradient: Floats
+) -> tuple[Floats, Floats]:
+    """Nielsen's rule: less damping the better the linear prediction was, and ever more when steps fail."""
+    predicted = -np.einsum("ni,ni->n", step, 2 * gradient + (normal @ step[..., None])[..., 0])
+    ratio = np.clip(gain / np.maximum(predicted, 1e-300), -1.0, 1.0)
+    less = np.maximum(damping * np.maximum(0.1, 1 - (2 * ratio - 1) ** 3), 1e-15)
+    return np.where(better, less, growth * damping), np.where(better, 2.0, 2 * growth)
+
+
+def _distance(p: Points, array: SensorArray) -> Floats:
+    """(n,) m from positions (n, 3) to the nearest sensor."""
+    away = p[:, None, :] - array.positions
+    return np.asarray(np.sqrt(np.einsum("nsi,nsi->ns", away, away).min(axis=-1)))
 
 
 def quadratures_at(rotor: Rotor, array: SensorArray, position: Points, frame: Floats) -> Floats:

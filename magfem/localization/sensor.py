@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
@@ -51,6 +52,16 @@ class Sensor:
         if abs(np.linalg.det(np.asarray(self.gain))) < 1e-6:
             raise InputError("sensor: gain cannot be undone: its axes must not lie in a plane")
 
+    @cached_property
+    def place(self) -> Floats:
+        """(3,) m, of the pose."""
+        return np.asarray(self.pose.translation)
+
+    @cached_property
+    def axes(self) -> Floats:
+        """(3, 3), its axes as columns in the common frame."""
+        return np.asarray(self.pose.rotation.as_matrix())
+
     def readings(self, B: Vectors) -> Vectors:
         """What the sensor reads, without noise and rounding, of fields B (..., 3) T in its own frame."""
         return np.asarray(B @ np.asarray(self.gain).T + self.offset)
@@ -90,8 +101,8 @@ def as_sensors(sensors: Sensors) -> SensorArray:
         raise _no_sensors()
     return SensorArray(
         found,
-        np.array([one.pose.translation for one in found]),
-        np.array([one.pose.rotation.as_matrix() for one in found]),
+        np.array([one.place for one in found]),
+        np.array([one.axes for one in found]),
     )
 
 
