@@ -60,6 +60,9 @@ def add(commands: CommandLine) -> None:
         "--drift", action="store_true", help="the frequency changes steadily, from near the stated one"
     )
     turning.add_argument(
+        "--swing", action="store_true", help="the magnet may turn unevenly, swinging twice a turn: find it and undo it"
+    )
+    turning.add_argument(
         "--rotation-axis", metavar="AXIS", help="in the model's frame: x, y, z or '0 1 1' (default: z)"
     )
     turning.add_argument(
@@ -152,8 +155,9 @@ def stated_setup(options: Namespace) -> tuple[Setup, list[Any] | None]:
     frequencies = tuple(_positive(text, "frequency", "--frequency") for text in options.frequency or [])
     if len(set(frequencies)) < len(frequencies):
         raise InputError("--frequency is given twice with the same value: every motor has its own")
-    if options.drift and len(frequencies) > 1:
-        raise InputError("--drift is for a single motor, and --frequency is given for several")
+    for name in ("drift", "swing"):
+        if getattr(options, name) and len(frequencies) > 1:
+            raise InputError(f"--{name} is for a single motor, and --frequency is given for several")
     near = [_position(text) for text in options.near or []]
     if near and len(near) != max(1, len(frequencies)):
         raise InputError(f"--near is given {len(near)} times, and there are {max(1, len(frequencies))} motors")
@@ -169,7 +173,7 @@ def stated_setup(options: Namespace) -> tuple[Setup, list[Any] | None]:
     else:
         sensors = {"": Sensor(**qualities)}
     axis = _axis(options.rotation_axis) if options.rotation_axis else (0.0, 0.0, 1.0)
-    return Setup(as_rotor(options.model, axis), frequencies, sensors, options.drift), near or None
+    return Setup(as_rotor(options.model, axis), frequencies, sensors, options.drift, options.swing), near or None
 
 
 def stated_rate(options: Namespace) -> float | None:

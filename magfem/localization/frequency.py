@@ -1,8 +1,14 @@
-"""The rotation frequency, found in the samples: a spectrum for the start, then least squares over all axes at once."""
+"""The rotation, found in the samples: a spectrum for the start, then least squares over all axes at once.
+
+A rotor that follows a stator whose two fields are neither equal nor perpendicular does not turn evenly: it swings twice
+a turn about where it would be, φ = θ + s_c cos 2θ + s_s sin 2θ. That puts a third harmonic into the field, by which it
+is known, and makes the first one's ellipse look rounder or flatter than it is, by which it spoils poses.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -16,16 +22,19 @@ _MOST_DRIFTS = 80  # either way, half a turn at the ends of the record from one 
 
 @dataclass(frozen=True, eq=False)
 class Frequency:
-    """A rotation frequency that may drift: the rotor has turned ∫f dt, f = at_middle + drift·(t − middle).
+    """A rotation whose frequency may drift, f = at_middle + drift·(t − middle), and that may swing.
 
     at_middle, deviation: (...) Hz, with its standard deviation; there it does not depend on the phase.  drift: (...)
-    Hz/s.  middle: s, the mean of the times.
+    Hz/s.  middle: s, the mean of the times.  swing: (..., 2) rad, s_c and s_s above, θ being zero at the middle; None
+    for a rotor that turns evenly.  swing_covariance: (..., 2, 2).
     """
 
     at_middle: Floats
     deviation: Floats
     drift: Floats
     middle: float
+    swing: Floats | None = None
+    swing_covariance: Floats | None = None
 
     @property
     def at_zero(self) -> Floats:
@@ -34,8 +43,21 @@ class Frequency:
 
     def turns(self, times: Floats) -> Floats:
         """(..., n) turns since the middle, at `times` (n,) s."""
+        return self._turns(times, self.at_middle[..., None], self.drift[..., None], (..., None, slice(None)))
+
+    def angle(self, time: Floats) -> Floats:
+        """(...) rad that the rotor has turned by since time zero, at `time` (...) s, broadcast with the rotations."""
+        both = [self._turns(one, self.at_middle, self.drift, (...,)) for one in (time, np.zeros(()))]
+        return np.asarray(2 * np.pi * (both[0] - both[1]))
+
+    def _turns(self, times: Floats, f: Floats, d: Floats, spread: Any) -> Floats:
         tau = times - self.middle
-        return self.at_middle[..., None] * tau + 0.5 * self.drift[..., None] * tau**2
+        even = f * tau + 0.5 * d * tau**2
+        if self.swing is None:
+            return even
+        swing = self.swing[spread]
+        double = 4 * np.pi * even
+        return np.asarray(even + (swing[..., 0] * np.cos(double) + swing[..., 1] * np.sin(double)) / (2 * np.pi))
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,14 +99,17 @@ def find_frequency(
     near: ArrayLike | None = None,
     *,
     drift: bool = False,
+    swing: bool = False,
+    known: bool = False,
     weight: ArrayLike | None = None,
 ) -> Frequency:
-    """The frequency of `samples` (..., n, c) T, whose c axes, of one sensor or many, all see one motor.
+    """The rotation in `samples` (..., n, c) T, whose c axes, of one sensor or many, all see one motor.
 
-    near: Hz, where to begin; None for the peak of the spectrum.  drift: whether the frequency may change.  weight:
-    (c,), one over the variance of a sample, T⁻²; None where all axes are equally noisy, by what is left over.
+    near: Hz, where to begin; None for the peak of the spectrum.  drift: whether the frequency may change.  swing:
+    whether the rotor may turn unevenly.  known: take the frequency `near` as it is, and find what else is asked for.
+    weight: (c,), one over the variance of a sample, T⁻²; None where all axes are equally noisy, by what is left over.
 
-    Variable projection: the amplitudes are eliminated at every step, so only frequency and drift are left, and
+    Variable projection: the amplitudes are eliminated at every step, so only frequency, drift and swing are left, and
     Gauss–Newton on these is exact where it ends. Raises InputError where no frequency is found.
     """
     b, t = np.asarray(samples, dtype=float), np.asarray(times, dtype=float)
@@ -95,27 +120,38 @@ def find_frequency(
     tau = t - middle
     weights = np.ones(columns) if weight is None else np.broadcast_to(np.asarray(weight, dtype=float), (columns,))
     f, d = _start(b, t, used, near, drift)
-    chosen = [0, 1] if drift else [0]
+    chosen = [0] * (not known) + [1] * drift + [2, 3] * swing  # of frequency, drift, and the swing's two parts
+    if (known and near is None) or not chosen:
+        raise InputError("state the known frequency, and what is to be found beside it: drift or swing")
+    unit = np.array([span, span**2, 1.0, 1.0])[chosen]  # what the unknowns are large by: turns over the record, rad
+    theta = np.concatenate([f[..., None], d[..., None], np.zeros((*lead, 2))], axis=-1)
     for _ in range(_MOST_STEPS):
-        information, gradient, misfit = _linearised(b, tau, used, f, d, weights)
+        information, gradient, misfit = _linearised(b, tau, used, theta, weights)
         information, gradient = information[..., chosen, :][..., chosen], gradient[..., chosen]
-        if not np.all(np.linalg.det(information) > 0):
+        scaled = information / (unit[:, None] * unit)
+        if not np.all(np.linalg.det(scaled) > 0):
             raise _lost()
-        step = np.linalg.solve(information, gradient[..., None])[..., 0]
-        size = np.abs(step[..., 0]) * span
+        step = np.linalg.solve(scaled, (gradient / unit)[..., None])[..., 0]
+        size = np.abs(step).max(axis=-1)
         step = step * np.minimum(1.0, 0.25 / np.maximum(size, 1e-300))[..., None]  # beyond it has left the peak
-        f = f + step[..., 0]
-        if drift:
-            d = d + step[..., 1]
-        if np.all(size < 1e-13 * np.maximum(1.0, np.abs(f) * span)):
+        theta[..., chosen] += step / unit
+        if np.all(size < 1e-13 * np.maximum(1.0, np.abs(theta[..., 0]) * span)):
             break
     scale: Floats = np.ones(lead)
     if weight is None:
         scale = misfit / np.maximum(used.sum(axis=(-2, -1)) - 3 * columns - len(chosen), 1)
-    variance = scale * np.linalg.inv(information)[..., 0, 0]
-    if not np.all((f > 0) & (size < 1e-6) & (variance >= 0) & (variance * span**2 < 0.1)):
+    covariance = scale[..., None, None] * np.linalg.inv(scaled) / (unit[:, None] * unit)
+    variance = np.zeros(lead) if known else covariance[..., 0, 0]
+    if not np.all((theta[..., 0] > 0) & (size < 1e-6) & (variance >= 0) & (variance * span**2 < 0.1)):
         raise _lost()
-    return Frequency(f, np.sqrt(variance), d, middle)
+    return Frequency(
+        theta[..., 0],
+        np.sqrt(variance),
+        theta[..., 1],
+        middle,
+        theta[..., 2:] if swing else None,
+        covariance[..., -2:, -2:] if swing else None,
+    )
 
 
 def _lost() -> InputError:
@@ -205,12 +241,15 @@ def _power(b: Floats, used: Booleans, waves: Complexes, chirp: Complexes | None 
     return power
 
 
-def _linearised(
-    b: Floats, tau: Floats, used: Booleans, f: Floats, d: Floats, weight: Floats
-) -> tuple[Floats, Floats, Floats]:
-    """Information (..., 2, 2) and gradient (..., 2) of (f, d), and the weighted misfit (...), amplitudes eliminated."""
-    turns = f[..., None] * tau + 0.5 * d[..., None] * tau**2
-    cos, sin = np.cos(2 * np.pi * turns), np.sin(2 * np.pi * turns)
+def _linearised(b: Floats, tau: Floats, used: Booleans, theta: Floats, weight: Floats) -> tuple[Floats, Floats, Floats]:
+    """Information (..., 4, 4) and gradient (..., 4) of frequency, drift and both parts of the swing, `theta` (..., 4),
+    and the weighted misfit (...), all amplitudes eliminated.
+    """
+    f, d, s_c, s_s = (theta[..., k, None] for k in range(4))
+    even = 2 * np.pi * (f * tau + 0.5 * d * tau**2)
+    cos2, sin2 = np.cos(2 * even), np.sin(2 * even)
+    angle = even + s_c * cos2 + s_s * sin2
+    cos, sin = np.cos(angle), np.sin(angle)
     X = (
         np.stack([np.ones_like(cos), cos, sin], axis=-1)[..., None, :, :] * np.swapaxes(used, -1, -2)[..., None]
     )  # (..., c, n, 3)
@@ -219,8 +258,10 @@ def _linearised(
     normal = np.linalg.inv(Xt @ X)
     c = normal @ (Xt @ y)  # (..., c, 3, 1)
     left = (y - X @ c)[..., 0]
-    speed = -c[..., 1, :] * sin[..., None, :] + c[..., 2, :] * cos[..., None, :]  # (..., c, n)
-    D = 2 * np.pi * np.stack([tau * speed, 0.5 * tau**2 * speed], axis=-1) * np.swapaxes(used, -1, -2)[..., None]
+    speed = -c[..., 1, :] * sin[..., None, :] + c[..., 2, :] * cos[..., None, :]  # (..., c, n) per rad
+    pace = 2 * np.pi * (1 - 2 * s_c * sin2 + 2 * s_s * cos2)  # of the angle, per turn of the even rotation
+    by = np.stack([pace * tau, 0.5 * pace * tau**2, cos2, sin2], axis=-1)  # (..., n, 4)
+    D = speed[..., None] * by[..., None, :, :] * np.swapaxes(used, -1, -2)[..., None]
     D = D - X @ (normal @ (Xt @ D))
     information = np.einsum("...ank,...anl,a->...kl", D, D, weight)
     gradient = np.einsum("...ank,...an,a->...k", D, left, weight)

@@ -44,6 +44,7 @@ def localize(
     near: ArrayLike | Branch | None = None,
     rotation_axis: ArrayLike = (0.0, 0.0, 1.0),
     drift: bool = False,
+    swing: bool = False,
     strict: bool = True,
 ) -> Pose:
     """The pose of a magnet that turns, from samples of its field.
@@ -55,6 +56,8 @@ def localize(
     near: where the rotor is about, (..., 3) m, or an earlier or expected pose: the branch closest to it is taken among
     those that are about as likely. Without it, one sensor's branch is the one with z > 0 and the axis nearest to +z.
     rotation_axis: (3,), in the model's frame.  drift: the frequency changes steadily, from near `frequency`.
+    swing: the magnet may turn unevenly, as one that follows the field of two unequal coils does: its swing twice a turn
+    is found, by the third harmonic of the field, and undone. More than six samples a turn are needed.
     strict: raise ConvergenceError where a refinement did not converge, instead of telling by `converged`.
 
     The magnet turns right-handed about `axis`; its moment across the axis points along `moment_direction(t)`.
@@ -63,7 +66,7 @@ def localize(
     rotor, array = as_rotor(model, rotation_axis), as_sensors(sensors)
     with one_thread_for_algebra():
         b = _with_sensors(samples, sensors, array)
-        fields = _demodulated(b, np.asarray(times, dtype=float), array, frequency, drift)
+        fields = _demodulated(b, np.asarray(times, dtype=float), array, frequency, drift, swing)
         return _located(fields, rotor, array, near, strict)
 
 
@@ -143,16 +146,16 @@ def _with_sensors(samples: ArrayLike, sensors: Sensors, array: SensorArray) -> F
 
 
 def _demodulated(
-    b: Floats, times: Floats, array: SensorArray, frequency: ArrayLike | None, drift: bool
+    b: Floats, times: Floats, array: SensorArray, frequency: ArrayLike | None, drift: bool, swing: bool
 ) -> tuple[RotatingField, ...]:
     """What each sensor saw of one motor: one frequency for all of them."""
     count = len(array.sensors)
     if times.ndim == 2 and times.shape[0] != count:
         raise InputError(f"times must be (n,) for all sensors or (sensors, n), got {times.shape} with {count} sensors")
     turning: ArrayLike | Frequency | None = frequency
-    if frequency is None or drift:
+    if frequency is None or drift or swing:
         if times.ndim == 2:
-            raise InputError("state the frequency, and no drift, for samples taken one sensor after another")
+            raise InputError("state the frequency, and no drift or swing, for samples taken one sensor after another")
         full = np.abs(b) >= np.array([one.saturation for one in array.sensors])[:, None, None]
         columns = np.moveaxis(np.where(full, np.nan, b), -3, -2).reshape(*b.shape[:-3], b.shape[-2], 3 * count)
         known = all(one.noise is not None for one in array.sensors)
@@ -160,7 +163,8 @@ def _demodulated(
         if known:
             noise = np.concatenate([np.asarray(one.noise, dtype=float) for one in array.sensors])
             weight = 1 / np.maximum(noise, np.finfo(float).tiny) ** 2 if noise.all() else None
-        turning = find_frequency(columns, times, frequency, drift=drift, weight=weight)
+        known = frequency is not None and not drift
+        turning = find_frequency(columns, times, frequency, drift=drift, swing=swing, known=known, weight=weight)
     return tuple(
         demodulate(
             b[..., k, :, :],

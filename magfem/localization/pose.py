@@ -92,5 +92,5 @@ class Pose(Branch):
         A rotor that is stopped and locked at that time bends in the plane of this direction and the axis.
         """
         t = np.asarray(time, dtype=float)
-        angle = self.phase + 2 * np.pi * (self.frequency * t + 0.5 * self.turning.drift * t**2)
+        angle = self.phase + self.turning.angle(t)
         return orientation(np.broadcast_to(self.axis, (*np.shape(angle), 3)), angle)[..., 0]

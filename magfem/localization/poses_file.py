@@ -55,6 +55,7 @@ def pose_to_dict(pose: Pose, time: float, window: tuple[float, float], sensors: 
         "frequency": float(pose.frequency),
         "frequency_deviation": float(pose.turning.deviation),
         "drift": float(pose.turning.drift),
+        "swing": None if pose.turning.swing is None else float(np.linalg.norm(pose.turning.swing)),
         **_branch(pose),
         "moment_direction": pose.moment_direction(time).tolist(),
         "position_deviation": _finite(pose.position_deviation),

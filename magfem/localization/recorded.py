@@ -30,13 +30,14 @@ class Setup:
 
     rotor: the motors' model.  frequencies: Hz, one for each motor; empty for one motor whose frequency is to be found.
     sensors: by their names, in the frame that they share; a single one, seen from which poses are told, by the empty
-    name.  drift: whether the frequency of a single motor changes steadily.
+    name.  drift, swing: whether the frequency of a single motor changes steadily, and whether it turns unevenly.
     """
 
     rotor: Rotor
     frequencies: tuple[float, ...]
     sensors: Mapping[str, Sensor]
     drift: bool = False
+    swing: bool = False
 
     @property
     def motors(self) -> int:
@@ -89,7 +90,8 @@ def localize_recording(
     frequency = setup.frequencies[0] if setup.frequencies else None
     if frequency is None and not _together(samples):
         return (_converged(_of_separate_times(samples, times, setup, sensors, prior[0])),), names
-    pose = localize(samples, times, setup.rotor, frequency, sensors, near=prior[0], drift=setup.drift, strict=False)
+    turning = {"drift": setup.drift, "swing": setup.swing}
+    pose = localize(samples, times, setup.rotor, frequency, sensors, near=prior[0], strict=False, **turning)
     return (_converged(pose),), names
 
 
@@ -102,8 +104,8 @@ def track_recording(
     its windows, those of windows with too few samples, and the sensors' names. Raises InputError and ConvergenceError
     as `track` does.
     """
-    if setup.motors > 1 or setup.drift:
-        raise InputError("a track is that of a single magnet, whose frequency does not drift")
+    if setup.motors > 1 or setup.drift or setup.swing:
+        raise InputError("a track is that of a single magnet, whose frequency does not drift and that turns evenly")
     times, samples, names = recording.evenly()
     sensors = [setup.sensor(name) for name in names]
     cut, within, starts = windows(samples, times, length, step)
@@ -136,7 +138,7 @@ def _of_separate_times(
     own = ~np.isnan(samples[strongest]).all(axis=-1)
     start = spectrum(samples[strongest][own], times[own]).peak
     columns = np.moveaxis(samples, 0, 1).reshape(len(times), -1)
-    turning = find_frequency(columns, times, start, drift=setup.drift)
+    turning = find_frequency(columns, times, start, drift=setup.drift, swing=setup.swing)
     fields = [
         demodulate(one, times, turning, noise=s.noise, resolution=s.resolution, saturation=s.saturation)
         for one, s in zip(samples, sensors, strict=True)

@@ -9,7 +9,7 @@ Averages over whole turns, as a Fourier transform takes them, are the special ca
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -70,14 +70,16 @@ def demodulate(
     resolution: float = 0.0,
     saturation: float = np.inf,
     drift: bool = False,
+    swing: bool = False,
 ) -> RotatingField:
     """The static field and the quadratures of one frequency in `samples` (..., n, 3) T taken at `times` (n,) s.
 
     frequency: Hz, a number or (...), or what `find_frequency` gave; None where it is to be found, within half the mean
-    rate of the samples.  drift: find how it drifts as well, and the frequency itself from near the given one.  noise:
-    T, standard deviation of a sample, a number or (3,); None to take it from what is left over.  resolution: T, the
-    step of the readings, whose share of the noise is added to a stated `noise`.  saturation: T; readings at or beyond
-    it are left out, as NaN are.
+    rate of the samples.  drift: find how it drifts as well, and the frequency itself from near the given one.  swing:
+    find how unevenly the rotor turns (see `frequency`); the quadratures are those of even turning.  noise: T, standard
+    deviation of a sample, a number or (3,); None to take it from what is left over.  resolution: T, the step of the
+    readings, whose share of the noise is added to a stated `noise`.  saturation: T; readings at or beyond it are left
+    out, as NaN are.
 
     Raises InputError for samples that do not determine the unknowns, saying why.
     """
@@ -86,18 +88,34 @@ def demodulate(
     sigma = None if noise is None else _stated_noise(noise, resolution)
     if isinstance(frequency, Frequency):
         turning = frequency
-    elif frequency is None or drift:
+    elif frequency is None or drift or swing:
         weight = None if sigma is None else 1 / np.maximum(sigma, np.finfo(float).tiny) ** 2
-        turning = find_frequency(np.where(missing, np.nan, b), t, frequency, drift=drift, weight=weight)
+        known = frequency is not None and not drift
+        turning = find_frequency(
+            *(np.where(missing, np.nan, b), t, frequency), drift=drift, swing=swing, known=known, weight=weight
+        )
     else:
         turning = _constant(frequency, lead, float(t.mean()))
     # One design for all leading axes where they share the frequency.
-    shared = not isinstance(frequency, Frequency) and not drift and frequency is not None and np.ndim(frequency) == 0
+    stated = not isinstance(frequency, Frequency) and frequency is not None and np.ndim(frequency) == 0
+    shared = stated and not drift and not swing
     turns = turning.turns(t)
-    fitted = _fit(
-        b, _design([turns.reshape(-1, t.size)[0] if shared and turns.size else turns]), missing, sigma, saturated
-    )
+    design = _design([turns.reshape(-1, t.size)[0] if shared and turns.size else turns])
+    fitted = _fit(b, design, missing, sigma, saturated)
+    if turning.swing is not None:
+        fitted = replace(fitted, by_swing=_by_swing(fitted, design, ~missing, turning, t))
     return _rotating(fitted, 0, turning)
+
+
+def _by_swing(fitted: _Fitted, X: Floats, used: Booleans, turning: Frequency, times: Floats) -> Floats:
+    """(..., k, 3, 2) how the coefficients answer to the swing's parts: least squares once more, of what it changes."""
+    even = replace(turning, swing=None).turns(times)
+    C, S = fitted.coefficients[..., 1, None, :], fitted.coefficients[..., 2, None, :]
+    speed = S * X[..., 1, None] - C * X[..., 2, None]
+    by = np.stack([np.cos(4 * np.pi * even), np.sin(4 * np.pi * even)], axis=-1)  # (..., n, 2)
+    change = np.where(used[..., None], speed[..., None] * by[..., :, None, :], 0.0)  # (..., n, 3, 2)
+    right = np.einsum("...nk,...nas->...kas", X, change)
+    return np.asarray(-np.einsum("...akl,...las->...kas", fitted.inverse, right))
 
 
 def demodulate_several(
@@ -139,7 +157,9 @@ def quadrature_covariance(times: ArrayLike, frequency: float, *, noise: ArrayLik
 
 @dataclass(frozen=True, eq=False)
 class _Fitted:
-    """coefficients (..., k, 3), the matrices (..., 3, k, k) that noise variances multiply, noise, residual, counts."""
+    """coefficients (..., k, 3), the matrices (..., 3, k, k) that noise variances multiply, noise, residual, counts;
+    by_swing (..., k, 3, 2), how the coefficients answer to the swing, None where there is none.
+    """
 
     coefficients: Floats
     inverse: Floats
@@ -147,6 +167,7 @@ class _Fitted:
     residual: Vectors
     count: Integers
     saturated: Integers
+    by_swing: Floats | None = None
 
 
 def _checked(samples: ArrayLike, times: ArrayLike, saturation: float) -> tuple[Floats, Floats, Booleans, Integers]:
@@ -270,6 +291,10 @@ def _rotating(fitted: _Fitted, j: int, turning: Frequency) -> RotatingField:
     turn = np.stack(rows, axis=-2)  # (..., 1, 3, 3)
     own = turn @ own @ np.swapaxes(turn, -1, -2)  # (..., 3, 3, 3)
     joint = np.einsum("...apq,ab->...paqb", own, np.eye(3)).reshape(*C.shape[:-1], 9, 9)
+    if fitted.by_swing is not None and turning.swing_covariance is not None:
+        by = np.einsum("...pq,...qas->...pas", turn[..., 0, :, :], fitted.by_swing[..., chosen, :, :])
+        flat = by.reshape(*C.shape[:-1], 9, 2)
+        joint = joint + flat @ turning.swing_covariance @ np.swapaxes(flat, -1, -2)
     return RotatingField(
         static=fitted.coefficients[..., 0, :],
         cosine=c * C + s * S,

@@ -15,7 +15,8 @@ quadrupole: beside the motor's ends, on its axis, the stator is strongest agains
 field there is an ellipse, and a needle that follows it does not turn evenly: its angle is φ + ε sin(2φ + …). The
 rotor's moment then has a part of the share ε/2 that turns the other way: it makes b_ratio wrong, hence β, α and the
 axis. Currents in the inverse ratio of the coils' fields mend part of it, and a phase that makes up for the angle
-between them the rest. Friction, which adds a lag, is left out.
+between them the rest. `localize(swing=True)` finds the swing in the samples, by the third harmonic that it makes, and
+undoes it. Friction, which adds a lag, is left out.
 
 The coils' models are closed paths of current (Biot–Savart along the lines of the solved current). Their regions are
 where they were checked, 0.3 to 2.7 mm from the stator, but a path's field is exact wherever the path is thin beside the
@@ -136,14 +137,16 @@ class StatorInfluence:
     """Fig. S6.6b and what follows from it.
 
     added: the bias by the stator's field alone, the rotor turning evenly.  uneven: with the rotor following the
-    stator's field as well.  added_moment: m_s/m, the share by which the stator adds to the rotor's moment.
-    unevenness: ε rad, the amplitude of the rotor's swing twice a turn.
+    stator's field as well.  mended: the same with the swing found from the samples, `localize(swing=True)`.
+    added_moment: m_s/m, the share by which the stator adds to the rotor's moment.  unevenness: ε rad, the amplitude of
+    the rotor's swing twice a turn.
     """
 
     current: float
     fields: FieldComparison
     added: PoseBias
     uneven: PoseBias
+    mended: PoseBias
     added_moment: float
     unevenness: float
 
@@ -178,6 +181,7 @@ def stator_influence(
         fields=field_comparison(magnet, stator, far),
         added=pose_bias(magnet, stator, far, even),
         uneven=pose_bias(magnet, stator, far, following),
+        mended=pose_bias(magnet, stator, far, following, swing=True),
         added_moment=float(stator.current * (moments[0][0] + moments[1][1]) / 2 / magnet.moment),
         unevenness=float(np.abs(np.mean(2 * _swing(following, even) * np.exp(-2j * even)))),
     )
@@ -192,7 +196,7 @@ def field_comparison(rotor: Rotor, stator: Stator, distances: Floats) -> FieldCo
     )
 
 
-def pose_bias(rotor: Rotor, stator: Stator, distances: Floats, angles: Floats) -> PoseBias:
+def pose_bias(rotor: Rotor, stator: Stator, distances: Floats, angles: Floats, swing: bool = False) -> PoseBias:
     """Localize the rotor by what a sensor sees of it and of the stator, at `distances` (d,) m.
 
     angles: (n,) rad, where the rotor is at evenly spaced phases of the currents.
@@ -208,7 +212,7 @@ def pose_bias(rotor: Rotor, stator: Stator, distances: Floats, angles: Floats) -
     points = towards * distances[:, None, None]  # (d, a, 3), the sensor in the motor's frame
     phases = 2 * np.pi * np.arange(angles.size) / angles.size
     samples = _turning(rotor.quadratures(points)[:2], angles) + _turning(stator.quadratures(points), phases)
-    found = localize(samples, phases / (2 * np.pi), rotor, 1.0, _QUIET, near=-points)
+    found = localize(samples, phases / (2 * np.pi), rotor, 1.0, _QUIET, near=-points, swing=swing)
     off = found.position + points
     apart = distances[:, None]
     return PoseBias(

@@ -97,7 +97,7 @@ def _signal(panels: Sequence[Axes], last: Recording, poses: Sequence[Pose], plac
 
 def _turning(field: RotatingField, times: Floats) -> Floats:
     """(n, 3) T, the part of a field that turns, at `times` (n,) s."""
-    angle = 2 * np.pi * (float(field.frequency) * times + 0.5 * float(field.turning.drift) * times**2)
+    angle = field.turning.angle(times)
     found: Floats = np.cos(angle)[:, None] * field.cosine + np.sin(angle)[:, None] * field.sine
     return found
 

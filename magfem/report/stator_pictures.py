@@ -7,7 +7,7 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 
 from magfem.localization.stator_influence import StatorInfluence
-from magfem.report.figures.style import BLUE, GREY, ORANGE, Picture, drawing, figure, grid, plain_log, png
+from magfem.report.figures.style import BLUE, GREEN, GREY, ORANGE, Picture, drawing, figure, grid, plain_log, png
 from magfem.typing import Floats
 
 MILLI, MICRO = 1e3, 1e6
@@ -65,6 +65,7 @@ def bias_picture(influence: StatorInfluence) -> Picture:
         for bias, colour, name in (
             (influence.added, BLUE, "stator’s field added"),
             (influence.uneven, ORANGE, "and the rotor’s uneven turning"),
+            (influence.mended, GREEN, "the swing found and undone"),
         ):
             left.loglog(distances, 100 * bias.position, color=colour, label=name)
             right.loglog(distances, np.degrees(bias.axis), color=colour)
@@ -88,7 +89,7 @@ def bias_picture(influence: StatorInfluence) -> Picture:
         "What the stator does to a pose at β = 45°, without noise, at the worst azimuth. Its field acts like "
         f"{100 * influence.added_moment:.2g} % more moment. As the coils’ fields in the rotor are neither equal nor "
         f"perpendicular, a rotor that follows them swings by {np.degrees(influence.unevenness):.2g}° twice a turn, "
-        "which matters more.",
+        "which matters more, unless the swing is found from the samples.",
     )
 
 

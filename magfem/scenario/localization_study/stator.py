@@ -123,6 +123,12 @@ def compared(found: StatorResult) -> tuple[Comparison, ...]:
             found=float(np.degrees(influence.uneven.axis.max())),
             unit="deg",
         ),
+        Comparison(
+            quantity="the same with the swing found from the samples and undone",
+            found=float(np.degrees(influence.mended.axis.max())),
+            unit="deg",
+            at_most=1.0,
+        ),
     )
 
 
@@ -137,4 +143,5 @@ def arrays(found: StatorResult) -> dict[str, Floats]:
         "stator": influence.fields.stator,
         "added_axis_bias": influence.added.axis,
         "uneven_axis_bias": influence.uneven.axis,
+        "mended_axis_bias": influence.mended.axis,
     }
