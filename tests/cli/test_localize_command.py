@@ -253,6 +253,17 @@ def test_the_rotation_axis_in_the_models_frame(here: Path, capsys: pytest.Captur
     assert "moment lies along the rotation axis" in capsys.readouterr().err
 
 
+def test_a_motor_that_swings(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """0.05 rad to and fro twice a turn, as if time went unevenly."""
+    later = T + 0.05 * np.cos(4 * np.pi * 0.5 * T) / (2 * np.pi * 0.5)
+    write_samples(Path("s.csv"), T, TRUE.field([0, 0, 0], later) + EARTH)
+    (pose,) = found(capsys, *FILE, *KNOWN, "--swing", "--frequency", "0.5")["poses"]
+    assert pose["swing"] == pytest.approx(0.05, rel=1e-6)
+    assert pose["position"] == pytest.approx(TRUE.position, abs=1e-8)
+    (even,) = found(capsys, *FILE, *KNOWN, "--frequency", "0.5")["poses"]
+    assert np.linalg.norm(np.subtract(even["position"], TRUE.position)) > 1e-4
+
+
 @pytest.mark.parametrize("stated", [[], ["--frequency", "0.51"]])
 def test_a_frequency_that_drifts(stated: list[str], here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """0.5 Hz at time zero, 1 mHz/s more: almost half a turn over the recording."""
