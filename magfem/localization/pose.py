@@ -44,7 +44,8 @@ class Pose(Branch):
 
     What `Branch` holds is that of the best branch.  branches: all that were found, best first. Where some of many poses
     have fewer of them, what fills up has a log_likelihood of −∞.  turning: the rotation frequency.  fields: what each
-    sensor saw.  ambiguous: (...) whether another branch is about as likely, as always with one sensor.  singular:
+    sensor saw.  ambiguous: (...) whether another branch is about as likely, as always with one sensor,
+    and with `near` about as near to it.  singular:
     (...) whether the branches ±β meet within what noise makes of β (β near 0 or 90° with one sensor): the covariance
     is not to be trusted there.  inside: (...) whether all sensors are where the rotor's model holds.  converged,
     iterations: (...).  residual: (...) root of the mean square of the standardised residuals; about √(1 − 1/s) with s
