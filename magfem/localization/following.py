@@ -40,9 +40,8 @@ class Belief:
     """What is believed of a magnet at `time` (s); h hypotheses, likeliest first.
 
     state: (h, 12), see `motion`.  state_covariance: (h, 12, 12).  frame: (h, 3, 3), orientation at time zero of the
-    window.
-    log_weight: (h,), zero for the first.  faulty: whether the last window did not fit what was predicted.  pose:
-    what that window says alone.
+    window.  log_weight: (h,), zero for the first.  faulty: whether the last window did not fit what was predicted.
+    pose: what that window says alone.
     """
 
     time: float
@@ -67,6 +66,11 @@ class Belief:
     def velocity(self) -> Vectors:
         """(3,) m/s."""
         return np.asarray(self.state[0, 6:9])
+
+    def moment_direction(self, time: float = 0.0) -> Vectors:
+        """(3,) unit vector of the moment across the axis, at `time` (s) of the last window's clock."""
+        angle = float(self.pose.turning.angle(np.asarray(time)))
+        return np.asarray(np.cos(angle) * self.frame[0, :, 0] + np.sin(angle) * self.frame[0, :, 1])
 
     @property
     def covariance(self) -> Floats:

@@ -8,6 +8,7 @@ from localization.paths import PAIR, TIMES, degrees_between, helix, root_mean_sq
 
 from magfem.errors import InputError
 from magfem.localization import Belief, ProcessNoise, Rotor, as_rotor, follow, track
+from magfem.localization.orientation import orientation
 from magfem.typing import Floats
 
 NOISE = ProcessNoise(3e-9, 3e-5)
@@ -70,6 +71,15 @@ def test_near_decides(rotor: Rotor) -> None:
     samples = seen(rotor, position, axis, PAIR[:1], 2)
     found = followed(rotor, samples, PAIR[:1], near=position[0])
     assert np.linalg.norm(found[-1].position - position[-1]) < 8e-3
+
+
+def test_the_moment_is_known_while_following(rotor: Rotor) -> None:
+    """To where it truly points at the end of the last window, within the phase's and the axis' errors."""
+    position, axis = (whole[:12] for whole in smooth_random(100, 6))
+    phase = np.random.default_rng(1002).uniform(-np.pi, np.pi, 12)  # as `seen` draws it
+    last = followed(rotor, seen(rotor, position, axis, PAIR, 2), PAIR)[-1]
+    expected = orientation(axis[-1], np.asarray(2 * np.pi * 2.0 + phase[-1]))[:, 0]
+    assert degrees_between(last.moment_direction(2.0), expected) < 15.0
 
 
 def test_windows_must_follow_each_other(rotor: Rotor) -> None:
