@@ -36,11 +36,10 @@ def add(commands: CommandLine) -> None:
 
 def run(options: Namespace) -> int:
     """Print the names, section by section."""
-    from magfem.cli.scenario_kinds import KINDS
-    from magfem.geometry.catalogue import folder, names
+    from magfem.geometry.catalogue import SIMULATED, folder, names
 
     found = {key: names(section, suffix) for key, _, section, suffix in SECTIONS}
-    scenarios = {name for name in found["scenarios"] if _entry(folder("reports") / f"{name}.toml", "kind") in KINDS}
+    scenarios = {name for name in found["scenarios"] if _entry(folder("reports") / f"{name}.toml", "kind") in SIMULATED}
     found["scenarios"] = tuple(name for name in found["scenarios"] if name in scenarios)
     found["reports"] = tuple(name for name in found["reports"] if name not in scenarios)
     text = "\n\n".join(

@@ -9,10 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from magfem.geometry.card import Table, read_table
-from magfem.geometry.catalogue import resolve, short_path
+from magfem.geometry.catalogue import SIMULATED, resolve, short_path
 from magfem.units import describe
-
-KINDS = ("scenario", "localize_and_steer", "localization_study")
 
 
 @dataclass(frozen=True)
@@ -74,5 +72,5 @@ def kind_of(recipe: Table) -> Kind:
 
         return Kind(study_folder.FILES, run_study, study_folder.write_study, Study.summary, study_text.text)
     got = describe(kind) if "kind" in recipe else "none"
-    known = ", ".join(f'"{one}"' for one in KINDS)
+    known = ", ".join(f'"{one}"' for one in SIMULATED)
     raise recipe.error(f"what is simulated is of kind {known}, got {got}", "kind")

@@ -23,6 +23,9 @@ _NOUNS = {
     ("reports", ".toml"): "recipe",
 }
 
+SIMULATED = ("scenario", "localize_and_steer", "localization_study")
+"""Kinds of recipes in `reports/` that `magfem simulate` runs; the others are of reports."""
+
 
 def folder(section: str) -> Path:
     """The folder of a section (`geometries`, `fits`, `reports`); it need not exist."""

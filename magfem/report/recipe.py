@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from magfem.fitting.readings import Reading, readings_from_table
 from magfem.geometry.card import Table, read_table
-from magfem.geometry.catalogue import resolve, short_path
+from magfem.geometry.catalogue import SIMULATED, resolve, short_path
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ def load_recipe(name_or_path: str | os.PathLike[str]) -> Recipe:
 
 def recipe_from_table(table: Table) -> Recipe:
     """Read a whole recipe file."""
-    if table.values.get("kind") == "scenario":
+    if table.values.get("kind") in SIMULATED:
         raise table.error("this is a scenario: magfem simulate runs it, and writes its page", "kind")
     table.only("device", "title", "measurement")
     return Recipe(
