@@ -88,8 +88,10 @@ def pose_bound(
     """
     rotor, array = as_rotor(model), as_sensors(sensors)
     p, a = np.broadcast_arrays(np.asarray(position, dtype=float), np.asarray(axis, dtype=float))
-    if p.shape[-1:] != (3,):
+    if p.shape[-1:] != (3,) or not (np.isfinite(p).all() and np.linalg.norm(a, axis=-1).all()):
         raise InputError(f"positions and axes must be (..., 3), got {np.shape(position)} and {np.shape(axis)}")
+    if not np.all(np.linalg.norm(p[..., None, :] - array.positions, axis=-1) > 0):
+        raise InputError("a bound needs rotors that are not where a sensor is")
     said = information(rotor, array, p, orientation(a, np.zeros(p.shape[:-1])), whitening(array, times, frequency))
     size = np.sqrt(np.maximum(np.einsum("...ii->...i", said), np.finfo(float).tiny))
     scaled = said / (size[..., :, None] * size[..., None, :])

@@ -100,7 +100,10 @@ def _apart(refined: Refined, near: ArrayLike | Branch | None) -> Floats:
     position, axis = refined.position, refined.frame[..., 2]
     if near is None:
         return np.asarray(-np.sign(position[..., 2]) + 0.1 * (1 - axis[..., 2]))
-    where = near.position if isinstance(near, Branch) else np.asarray(near, dtype=float)
+    try:
+        where = near.position if isinstance(near, Branch) else np.asarray(near, dtype=float)
+    except (TypeError, ValueError):
+        where = np.empty(0)
     if where.shape[-1:] != (3,) or not np.isfinite(where).all():
         raise InputError("near must be positions (..., 3) in m, or a pose")
     size = np.linalg.norm(position, axis=-1)

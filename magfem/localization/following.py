@@ -110,6 +110,8 @@ def follow(
     if belief is not None and not time > belief.time:
         raise InputError(f"windows must follow each other in time: {time:g} s is not after {belief.time:g} s")
     pose = localize(samples, times, rotor, frequency, sensors, strict=False)
+    if not isinstance(noise, ProcessNoise):
+        raise InputError("follow needs the process noise, such as track finds: ProcessNoise(1e-8, 1e-5)")
     if pose.position.ndim != 1:
         raise InputError("follow takes one window at a time; a whole record is for track")
     with one_thread_for_algebra():

@@ -11,12 +11,16 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.stats import chi2
 
 from magfem.errors import InputError
 from magfem.typing import ArrayLike, Booleans, Complexes, Floats
 
 _PER_LINE = 4  # points of the spectrum per 1/(time sampled): a peak is met within an eighth of its width
 _MOST_STEPS = 30
+FALSE_ALARM = 1e-6
+"""Probability that noise alone is taken for a rotation."""
+
 _MOST_DRIFTS = 80  # either way, half a turn at the ends of the record from one to the next
 
 
@@ -142,6 +146,8 @@ def find_frequency(
         scale = misfit / np.maximum(used.sum(axis=(-2, -1)) - 3 * columns - len(chosen), 1)
     covariance = scale[..., None, None] * np.linalg.inv(scaled) / (unit[:, None] * unit)
     variance = np.zeros(lead) if known else covariance[..., 0, 0]
+    if not known and near is None and not np.all(_stands_out(b, used, weights, misfit, scale, 0.5 * t.size)):
+        raise _lost()
     if not np.all((theta[..., 0] > 0) & (size < 1e-6) & (variance >= 0) & (variance * span**2 < 0.1)):
         raise _lost()
     return Frequency(
@@ -152,6 +158,14 @@ def find_frequency(
         theta[..., 2:] if swing else None,
         covariance[..., -2:, -2:] if swing else None,
     )
+
+
+def _stands_out(b: Floats, used: Booleans, weight: Floats, misfit: Floats, scale: Floats, lines: float) -> Booleans:
+    """(...) whether a sinusoid takes more off the misfit than noise alone would, the best of so many lines."""
+    count = np.maximum(used.sum(axis=-2, keepdims=True), 1)
+    centred = np.where(used, b - b.sum(axis=-2, keepdims=True) / count, 0.0)
+    taken = np.einsum("...na,a->...", centred**2, weight) - misfit
+    return np.asarray(taken > scale * chi2.isf(FALSE_ALARM / max(lines, 1.0), 2 * b.shape[-1]))
 
 
 def _lost() -> InputError:

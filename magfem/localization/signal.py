@@ -17,6 +17,8 @@ from magfem.errors import InputError
 from magfem.localization.frequency import Frequency, find_frequency
 from magfem.typing import ArrayLike, Booleans, Floats, Integers, Vectors
 
+STRONGEST = 100.0  # T, beyond what any sensor reads: samples in another unit
+
 LARGEST_CONDITION = 10.0
 """Of the scaled design: beyond, what is called one frequency could as well be another, or the static field."""
 
@@ -133,7 +135,10 @@ def demodulate_several(
     static field, in samples of this length.
     """
     b, t, missing, saturated = _checked(samples, times, saturation)
-    given = np.asarray(frequencies, dtype=float)
+    try:
+        given = np.asarray(frequencies, dtype=float)
+    except (TypeError, ValueError):
+        given = np.empty(0)
     if given.ndim != 1 or not given.size:
         raise InputError(f"frequencies must be a list of numbers in Hz, got {frequencies!r}")
     motors = [_constant(f, (), float(t.mean())) for f in given]
@@ -178,6 +183,8 @@ def _checked(samples: ArrayLike, times: ArrayLike, saturation: float) -> tuple[F
         raise InputError("samples and times must be real numbers, samples (..., n, 3) in T, times (n,) in s") from None
     if b.ndim < 2 or b.shape[-1] != 3 or t.shape != (b.shape[-2],):
         raise InputError(f"samples must be (..., n, 3) and times (n,), got {b.shape} and {t.shape}")
+    if not b.size:
+        raise InputError(f"there are no samples: {b.shape}")
     if not np.isfinite(t).all():
         raise InputError("times must be finite numbers in s")
     if t.size < 2 or not np.ptp(t) > 0:
@@ -186,6 +193,8 @@ def _checked(samples: ArrayLike, times: ArrayLike, saturation: float) -> tuple[F
         )
     if np.isinf(b).any():
         raise InputError("samples must be finite; those that are missing are NaN")
+    if np.nanmax(np.abs(b), initial=0.0) > STRONGEST:
+        raise InputError(f"samples are fields in T, got {np.nanmax(np.abs(b)):.3g}: multiply those in µT by 1e-6")
     full = np.abs(b) >= saturation
     missing = np.isnan(b) | full
     return np.where(missing, 0.0, b), t, missing, full.sum(axis=-2)
@@ -206,7 +215,13 @@ def _constant(frequency: ArrayLike, lead: tuple[int, ...], middle: float) -> Fre
         given = np.asarray(np.nan)
     if not np.all(np.isfinite(given) & (given > 0)):
         raise InputError(f"a rotation frequency must be a positive number in Hz, got {frequency!r}")
-    return Frequency(np.array(np.broadcast_to(given, lead)), np.zeros(lead), np.zeros(lead), middle)
+    try:
+        each = np.array(np.broadcast_to(given, lead))
+    except ValueError:
+        raise InputError(
+            f"frequencies {given.shape} do not fit samples with leading axes {lead}: state one, or one for each"
+        ) from None
+    return Frequency(each, np.zeros(lead), np.zeros(lead), middle)
 
 
 def _design(turns: Sequence[Floats]) -> Floats:
@@ -235,7 +250,7 @@ def _fit(
     else:
         count = np.full((*b.shape[:-2], 3), b.shape[-2])
         normal = (np.swapaxes(X, -1, -2) @ X)[..., None, :, :]
-    if count.min() <= k:
+    if count.min(initial=k + 1) <= k:
         raise InputError(
             f"{count.min()} usable samples on an axis of the sensor do not determine {k} unknowns and the noise: take "
             "more, and look at gaps and saturation"

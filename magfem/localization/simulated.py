@@ -36,6 +36,8 @@ def simulated_samples(
     place, upright, turned = (np.asarray(one, dtype=float) for one in (position, axis, phase))
     if instants.ndim != 1 or place.shape[-1:] != (3,) or upright.shape[-1:] != (3,):
         raise InputError("simulated samples need times (n,), a position (..., 3) and an axis (..., 3)")
+    if not np.linalg.norm(upright, axis=-1).all():
+        raise InputError("an axis must have a direction, got one of length zero")
     generator = np.random.default_rng(seed)
     angles = turned[..., None] + 2 * np.pi * frequency * instants  # (..., n)
     frames = orientation(upright[..., None, :], angles)[..., None, :, :, :]  # (..., 1, n, 3, 3)
