@@ -75,8 +75,7 @@ def refine(
     """The poses nearest to the starts `position` (..., 3) m, `frame` (..., 3, 3) that explain `measured` best.
 
     The leading axes of `measured` broadcast to those of the starts, whose last are candidates of one pose.  give_up: a
-    candidate whose misfit is by so much above that of another which has converged, and hardly falls, is left where it
-    is, not converged.
+    candidate whose misfit is by so much above that of another, and hardly falls, is left where it is, not converged.
     """
     lead = position.shape[:-1]
     count = int(np.prod(lead))
@@ -85,7 +84,7 @@ def refine(
     weight = np.broadcast_to(measured.whitening, (*lead, *measured.whitening.shape[-3:])).reshape(count, -1, 6, 6)
     misfit, converged, iterations = np.empty(count), np.zeros(count, dtype=bool), np.zeros(count, dtype=np.int64)
     group = np.arange(count) // (lead[-1] if lead else 1)  # candidates of one pose
-    least = np.full(group[-1] + 1 if count else 0, np.inf)  # the least misfit that has converged, by pose
+    least = np.full(group[-1] + 1 if count else 0, np.inf)  # the least misfit so far, by pose
 
     # Below, arrays are of the candidates under way: `going` are their numbers.
     going = np.arange(count)
@@ -106,6 +105,7 @@ def refine(
         little = NEGLIGIBLE if iteration < PATIENCE else 1e3 * NEGLIGIBLE
         flat = better & (gain < np.maximum(little, 1e-14 * tried_value)) & (damping <= LIGHT)
         stuck = ~better & (damping > 1e8)
+        np.minimum.at(least, group[going], np.where(better, tried_value, value))
         behind = value - least[group[going]]
         hopeless = (behind > give_up) & (gain < FALLING * behind) & (iteration >= HOPEFUL)
 
@@ -118,7 +118,6 @@ def refine(
             # Rejected small steps end at a minimum as well: rounding is all that is left.
             ended = small | flat | (stuck & (length < 1e-6))
             converged[going[ended]] = True
-            np.minimum.at(least, group[going[ended]], value[ended])
             keep = ~done
             if not keep.any():
                 break
