@@ -13,6 +13,7 @@ import numpy as np
 
 from magfem.errors import InputError
 from magfem.localization.orientation import orientation
+from magfem.localization.real_numbers import real_numbers
 from magfem.localization.refinement import information
 from magfem.localization.rotor import Model, as_rotor
 from magfem.localization.sensor import SensorArray, Sensors, as_sensors
@@ -87,9 +88,16 @@ def pose_bound(
     a sensor whose noise is not stated, and samples that determine nothing.
     """
     rotor, array = as_rotor(model), as_sensors(sensors)
-    p, a = np.broadcast_arrays(np.asarray(position, dtype=float), np.asarray(axis, dtype=float))
-    if p.shape[-1:] != (3,) or not (np.isfinite(p).all() and np.linalg.norm(a, axis=-1).all()):
-        raise InputError(f"positions and axes must be (..., 3), got {np.shape(position)} and {np.shape(axis)}")
+    words = "positions in m and axes must be finite numbers (..., 3), axes not zero"
+    p, a = real_numbers(position, words), real_numbers(axis, words)
+    if p.shape[-1:] != (3,) or a.shape[-1:] != (3,) or not (np.isfinite(p).all() and np.isfinite(a).all()):
+        raise InputError(f"{words}, got {p.shape} and {a.shape}")
+    if not np.linalg.norm(a, axis=-1).all():
+        raise InputError(f"{words}, got an axis of length zero")
+    try:
+        p, a = np.broadcast_arrays(p, a)
+    except ValueError:
+        raise InputError(f"as many axes as positions, or one, are needed, got {a.shape} and {p.shape}") from None
     if not np.all(np.linalg.norm(p[..., None, :] - array.positions, axis=-1) > 0):
         raise InputError("a bound needs rotors that are not where a sensor is")
     said = information(rotor, array, p, orientation(a, np.zeros(p.shape[:-1])), whitening(array, times, frequency))

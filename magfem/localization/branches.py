@@ -7,6 +7,7 @@ import numpy as np
 from magfem.errors import InputError
 from magfem.localization.orientation import phase_of
 from magfem.localization.pose import Branch, Pose
+from magfem.localization.real_numbers import real_numbers
 from magfem.localization.refinement import Measured, Refined
 from magfem.localization.rotor import Rotor
 from magfem.localization.sensor import SensorArray
@@ -20,6 +21,8 @@ AS_LIKELY = 3.0
 
 PLAUSIBLE = 10.0
 """Within this log likelihood of the best a branch may be preferred for lying near where the rotor was."""
+
+FARTHEST = 1e6  # m, of a place that a magnet may be at
 
 CLEARLY = 0.3
 """A branch is clearly nearer to a prior than another when it is by so much of the distance, or rad."""
@@ -100,17 +103,27 @@ def _apart(refined: Refined, near: ArrayLike | Branch | None) -> Floats:
     position, axis = refined.position, refined.frame[..., 2]
     if near is None:
         return np.asarray(-np.sign(position[..., 2]) + 0.1 * (1 - axis[..., 2]))
-    try:
-        where = near.position if isinstance(near, Branch) else np.asarray(near, dtype=float)
-    except (TypeError, ValueError):
-        where = np.empty(0)
-    if where.shape[-1:] != (3,) or not np.isfinite(where).all():
-        raise InputError("near must be positions (..., 3) in m, or a pose")
+    words = "near must be positions (..., 3) in m, or a pose"
+    where = near.position if isinstance(near, Branch) else real_numbers(near, words)
+    if where.shape[-1:] != (3,) or not np.all(np.abs(where) < FARTHEST):
+        raise InputError(words)
+    if not _fits(where.shape[:-1], position.shape[:-2]):
+        raise InputError(
+            f"near {where.shape} does not fit poses with leading axes {position.shape[:-2]}: state one, or one for each"
+        )
     size = np.linalg.norm(position, axis=-1)
     apart = np.linalg.norm(position - where[..., None, :], axis=-1) / np.maximum(size, 1e-12)
     if isinstance(near, Branch):
         apart = apart + np.linalg.norm(axis - near.axis[..., None, :], axis=-1)
     return np.asarray(apart)
+
+
+def _fits(shape: tuple[int, ...], lead: tuple[int, ...]) -> bool:
+    """Whether arrays of `shape` broadcast to `lead`, and not beyond."""
+    try:
+        return np.broadcast_shapes(shape, lead) == lead
+    except ValueError:
+        return False
 
 
 def _ranked(refined: Refined, log_likelihood: Floats, apart: Floats, prior: bool) -> tuple[Integers, Booleans]:

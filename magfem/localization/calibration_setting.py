@@ -11,6 +11,7 @@ from magfem.errors import InputError
 from magfem.localization.calibration_fit import Readings
 from magfem.localization.calibration_readings import FINDABLE, Layout, Motion, Unknowns
 from magfem.localization.orientation import upright_frame
+from magfem.localization.real_numbers import SAMPLES, TIMES, real_numbers
 from magfem.localization.sensor import Sensor, SensorArray, Sensors, is_one
 from magfem.localization.signal import demodulate
 from magfem.typing import ArrayLike, Floats, Points
@@ -20,10 +21,7 @@ FEWEST_SAMPLES = 6  # on each axis of a sensor, and half of what was taken
 
 def checked_samples(samples: ArrayLike, sensors: Sensors, array: SensorArray) -> Floats:
     """(k, s, n, 3)."""
-    try:
-        b = np.asarray(samples, dtype=float)
-    except (TypeError, ValueError):
-        raise InputError("samples must be real numbers in T") from None
+    b = real_numbers(samples, SAMPLES)
     if is_one(sensors) and b.ndim == 3:
         b = b[:, None]
     if b.ndim != 4 or b.shape[1] != len(array.sensors) or b.shape[-1] != 3 or not b.size:
@@ -84,10 +82,12 @@ def setting(
 
 
 def _rows(value: ArrayLike, shape: tuple[int, ...], name: str, unit: str) -> Floats:
+    words = f"{name} must be numbers {shape} {unit}".rstrip()
+    given = real_numbers(value, words)
     try:
-        found = np.broadcast_to(np.asarray(value, dtype=float), shape)
-    except (TypeError, ValueError):
-        raise InputError(f"{name} must be numbers {shape} {unit}".rstrip() + f", got {np.shape(value)}") from None
+        found = np.broadcast_to(given, shape)
+    except ValueError:
+        raise InputError(f"{words}, got {given.shape}") from None
     if not np.isfinite(found).all():
         raise InputError(f"{name} must be finite numbers")
     return found
@@ -109,7 +109,7 @@ def measured_readings(
 ) -> tuple[Readings, Floats]:
     """Readings of samples (k, s, n, 3), and the noise (s, 3) T of a sample, where not stated found from all poses."""
     k, s, n, _ = b.shape
-    t = np.asarray(times, dtype=float)
+    t = real_numbers(times, TIMES)
     if t.shape not in ((n,), (k, n)):
         raise InputError(f"times must be ({n},) or ({k}, {n}) s for samples {b.shape}, got {t.shape}")
     first = 0 if layout.static_used else 3

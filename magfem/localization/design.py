@@ -18,6 +18,7 @@ from magfem.errors import ConvergenceError, InputError
 from magfem.localization.bounds import pose_bound, whitening
 from magfem.localization.dipole_pose import dipole_poses
 from magfem.localization.orientation import orientation
+from magfem.localization.real_numbers import real_numbers
 from magfem.localization.refinement import Measured, quadratures_at, refine
 from magfem.localization.rotor import Model, Rotor, as_rotor
 from magfem.localization.sensor import Sensor, SensorArray, Sensors, as_sensors
@@ -67,10 +68,8 @@ def workspace(
     InputError as `pose_bound` does.
     """
     rotor, array = as_rotor(model), as_sensors(sensors)
-    place = np.asarray(points, dtype=float)
-    along = np.asarray(_AXES if axes is None else axes, dtype=float)
-    if along.ndim != 2 or along.shape[1] != 3:
-        raise InputError(f"axes must be (k, 3), got {along.shape}")
+    place = real_numbers(points, "points must be finite numbers (..., 3) in m")
+    along = _stated_axes(axes)
     with one_thread_for_algebra():
         bound = pose_bound(rotor, place[..., None, :], along, sensors, times=times, frequency=frequency)
         wrong = _wrong_branch(rotor, array, place, along, whitening(array, times, frequency))
@@ -83,6 +82,14 @@ def workspace(
         worst_axis=bound.axis.max(axis=-1),
         wrong_branch=wrong,
     )
+
+
+def _stated_axes(axes: ArrayLike | None) -> Vectors:
+    """(k, 3): those stated, or sixteen over all directions."""
+    along = real_numbers(_AXES if axes is None else axes, "axes must be directions (k, 3)")
+    if along.ndim != 2 or along.shape[1] != 3 or not len(along):
+        raise InputError(f"axes must be directions (k, 3), got {along.shape}")
+    return along
 
 
 def _mean(values: Floats) -> Floats:
@@ -216,9 +223,9 @@ def place_sensors(
     Raises InputError for boxes and counts that are none, ConvergenceError unless `strict` is false.
     """
     rotor = as_rotor(model)
-    points = np.asarray(region, dtype=float)
-    lower, upper = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
-    along = np.asarray(_AXES if axes is None else axes, dtype=float)
+    points = real_numbers(region, "region must be points (n, 3) in m")
+    lower, upper = (real_numbers(one, "low and high must be corners (3,) in m of a box") for one in (low, high))
+    along = _stated_axes(axes)
     if points.ndim != 2 or points.shape[1] != 3 or not len(points):
         raise InputError(f"region must be points (n, 3) in m, got {points.shape}")
     if lower.shape != (3,) or upper.shape != (3,) or not np.all(lower <= upper):

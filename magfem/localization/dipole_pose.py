@@ -36,6 +36,7 @@ import numpy as np
 from magfem.constants import MU_0
 from magfem.cross_matrix import cross
 from magfem.errors import InputError
+from magfem.localization.real_numbers import real_numbers
 from magfem.typing import ArrayLike, Booleans, Floats, Points, Vectors
 
 
@@ -63,11 +64,19 @@ class DipolePoses:
 def dipole_poses(cosine: ArrayLike, sine: ArrayLike, moment: float) -> DipolePoses:
     """The poses of a dipole of `moment` (A·m², across its axis) from C and S (..., 3) T of one sensor, in its frame.
 
-    Raises InputError where C and S are not finite, or parallel: then nothing turns.
+    Raises InputError where C and S are not finite, or parallel: then nothing turns; and for a moment that is none.
     """
-    C, S = np.broadcast_arrays(np.asarray(cosine, dtype=float), np.asarray(sine, dtype=float))
-    if C.shape[-1:] != (3,) or not (np.isfinite(C).all() and np.isfinite(S).all()):
-        raise InputError("the quadratures of a field must be finite numbers (..., 3) in T")
+    words = "the quadratures of a field must be finite numbers (..., 3) in T"
+    C, S = real_numbers(cosine, words), real_numbers(sine, words)
+    if C.shape[-1:] != (3,) or S.shape[-1:] != (3,) or not (np.isfinite(C).all() and np.isfinite(S).all()):
+        raise InputError(words)
+    try:
+        C, S = np.broadcast_arrays(C, S)
+    except ValueError:
+        raise InputError(f"as many cosine as sine parts are needed, got {C.shape} and {S.shape}") from None
+    size = real_numbers(moment, "a moment must be a positive number in A·m²")
+    if size.ndim or not 0 < size < np.inf:
+        raise InputError(f"a moment must be a positive number in A·m², got {moment!r}")
     # Singular values of a 3 × 2 matrix by the angle that makes its columns perpendicular: faster than a general SVD,
     # and exact to rounding as nothing cancels.
     cc, ss, cs = (np.einsum("...i,...i->...", a, b) for a, b in ((C, C), (S, S), (C, S)))
@@ -94,7 +103,7 @@ def dipole_poses(cosine: ArrayLike, sine: ArrayLike, moment: float) -> DipolePos
         np.cos(turn)[..., None, None] * u1[..., None, :]
         + side[:, None] * np.sin(turn)[..., None, None] * n[..., None, :]
     )
-    r = np.cbrt(MU_0 * moment / (4 * np.pi * s2))
+    r = np.cbrt(MU_0 * size / (4 * np.pi * s2))
     return DipolePoses(
         position=r[..., None, None] * towards,
         frame=_frames(towards, C[..., None, :], S[..., None, :]),

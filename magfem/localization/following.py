@@ -19,6 +19,7 @@ from magfem.localization.localize import localize, whitened
 from magfem.localization.motion import DIFFUSE, ProcessNoise, dynamics, update
 from magfem.localization.orientation import orientation
 from magfem.localization.pose import Pose
+from magfem.localization.real_numbers import TIMES, real_numbers
 from magfem.localization.refinement import Measured
 from magfem.localization.rotor import Model, as_rotor
 from magfem.localization.sensor import Sensors, as_sensors
@@ -106,7 +107,7 @@ def follow(
     the last.
     """
     rotor, array = as_rotor(model, rotation_axis), as_sensors(sensors)
-    time = start + float(np.mean(np.asarray(times, dtype=float)))
+    time = start + float(np.mean(real_numbers(times, TIMES)))
     if belief is not None and not time > belief.time:
         raise InputError(f"windows must follow each other in time: {time:g} s is not after {belief.time:g} s")
     pose = localize(samples, times, rotor, frequency, sensors, strict=False)
@@ -152,7 +153,8 @@ def _first(pose: Pose, near: ArrayLike | None) -> _Prior:
     count = len(position)
     weight: Floats = np.zeros(count)
     if near is not None:
-        weight -= HOPELESS * np.linalg.norm(position - np.asarray(near, dtype=float), axis=-1) / pose.distance
+        where = real_numbers(near, "near must be a position (3,) in m")
+        weight -= HOPELESS * np.linalg.norm(position - where, axis=-1) / pose.distance
     state = np.concatenate([position, frame[:, :, 2], np.zeros((count, 6))], axis=-1)
     return _Prior(state, np.tile(np.diag(DIFFUSE), (count, 1, 1)), weight, position, frame)
 

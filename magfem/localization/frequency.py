@@ -14,6 +14,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from magfem.errors import InputError
+from magfem.localization.real_numbers import SAMPLES, TIMES, real_numbers
 from magfem.typing import ArrayLike, Booleans, Complexes, Floats
 
 _PER_LINE = 4  # points of the spectrum per 1/(time sampled): a peak is met within an eighth of its width
@@ -87,13 +88,17 @@ def spectrum(
     frequencies: (f,) Hz; by default lines four to each 1/(time sampled), from one turn in that time to `highest`, which
     is half the mean rate unless stated.
     """
-    b, t = np.asarray(samples, dtype=float), np.asarray(times, dtype=float)
+    b, t = real_numbers(samples, SAMPLES), real_numbers(times, TIMES)
     if b.ndim < 2 or t.shape != (b.shape[-2],) or t.size < 4 or not np.ptp(t) > 0:
         raise InputError(
             f"a spectrum needs samples (..., n, 3) and times (n,), n of 4 or more, got {b.shape}, {t.shape}"
         )
     used = np.isfinite(b)
-    lines = _lines(t, highest) if frequencies is None else np.asarray(frequencies, dtype=float)
+    lines = (
+        _lines(t, highest)
+        if frequencies is None
+        else real_numbers(frequencies, "frequencies must be numbers (f,) in Hz")
+    )
     return Spectrum(lines, _power(np.where(used, b, 0.0), used, _waves(lines, t - t.mean())))
 
 
@@ -116,7 +121,7 @@ def find_frequency(
     Variable projection: the amplitudes are eliminated at every step, so only frequency, drift and swing are left, and
     Gauss–Newton on these is exact where it ends. Raises InputError where no frequency is found.
     """
-    b, t = np.asarray(samples, dtype=float), np.asarray(times, dtype=float)
+    b, t = real_numbers(samples, SAMPLES), real_numbers(times, TIMES)
     used = np.isfinite(b)
     b = np.where(used, b, 0.0)
     lead, columns = b.shape[:-2], b.shape[-1]
@@ -190,7 +195,7 @@ def _start(b: Floats, t: Floats, used: Booleans, near: ArrayLike | None, drift: 
         lines, power = found[0][0], np.stack([one[1] for one in found], axis=-2)
         best = power.reshape(*lead, -1).argmax(axis=-1)  # of drifts × lines
         return lines[best % lines.size], drifts[best // lines.size]
-    start = np.array(np.broadcast_to(np.asarray(near, dtype=float), lead))
+    start = np.array(np.broadcast_to(real_numbers(near, "a frequency must be a number in Hz"), lead))
     if not np.all(np.isfinite(start) & (start > 0)):
         raise InputError(f"a rotation frequency must be a positive number in Hz, got {near!r}")
     if not drift:

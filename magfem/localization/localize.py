@@ -13,6 +13,7 @@ from magfem.localization.branches import best_pose
 from magfem.localization.dipole_pose import dipole_poses
 from magfem.localization.frequency import Frequency, find_frequency
 from magfem.localization.pose import Branch, Pose
+from magfem.localization.real_numbers import SAMPLES, TIMES, real_numbers
 from magfem.localization.refinement import Measured, refine
 from magfem.localization.rotor import Model, Rotor, as_rotor
 from magfem.localization.sensor import SensorArray, Sensors, as_sensors, is_one
@@ -59,7 +60,7 @@ def localize(
     rotor, array = as_rotor(model, rotation_axis), as_sensors(sensors)
     with one_thread_for_algebra():
         b = _with_sensors(samples, sensors, array)
-        fields = _demodulated(b, np.asarray(times, dtype=float), array, frequency, drift, swing)
+        fields = _demodulated(b, real_numbers(times, TIMES), array, frequency, drift, swing)
         return _located(fields, rotor, array, near, strict)
 
 
@@ -123,10 +124,7 @@ def locate_field(
 
 def _with_sensors(samples: ArrayLike, sensors: Sensors, array: SensorArray) -> Floats:
     """Samples (..., s, n, 3)."""
-    try:
-        b = np.asarray(samples, dtype=float)
-    except (TypeError, ValueError):
-        raise InputError("samples must be real numbers (..., n, 3) in T") from None
+    b = real_numbers(samples, SAMPLES)
     if is_one(sensors):
         if b.ndim < 2 or b.shape[-1] != 3:
             raise InputError(f"samples of one sensor must be (..., n, 3), got {b.shape}")

@@ -8,6 +8,7 @@ import numpy as np
 
 from magfem.localization.frequency import Frequency
 from magfem.localization.orientation import orientation
+from magfem.localization.real_numbers import real_numbers
 from magfem.localization.signal import RotatingField
 from magfem.typing import ArrayLike, Booleans, Floats, Integers, Points, Vectors
 
@@ -92,6 +93,6 @@ class Pose(Branch):
 
         A rotor that is stopped and locked at that time bends in the plane of this direction and the axis.
         """
-        t = np.asarray(time, dtype=float)
+        t = real_numbers(time, "a time must be real numbers in s")
         angle = self.phase + self.turning.angle(t)
         return orientation(np.broadcast_to(self.axis, (*np.shape(angle), 3)), angle)[..., 0]

@@ -46,6 +46,7 @@ from magfem.fields.field import as_points
 from magfem.localization.ellipse_fit import principal_axes
 from magfem.localization.isolines import IsolineFunctions
 from magfem.localization.plane_fit import least_absolute_normal, perpendicular_pair
+from magfem.localization.real_numbers import SAMPLES, TIMES, real_numbers
 from magfem.typing import ArrayLike, Booleans, Floats, Integers, Points, Vectors
 
 BRANCHES: Integers = np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]])
@@ -167,10 +168,7 @@ def field_ellipse(samples: ArrayLike, times: ArrayLike) -> FieldEllipse:
 
     Raises InputError for arrays that do not fit, or fewer than six samples.
     """
-    try:
-        given, moments = np.asarray(samples, dtype=float), np.asarray(times, dtype=float)
-    except (TypeError, ValueError):
-        raise InputError("samples must be numbers (..., n, 3) in T, times (n,) in s") from None
+    given, moments = real_numbers(samples, SAMPLES), real_numbers(times, TIMES)
     if given.ndim < 2 or given.shape[-1] != 3:
         raise InputError(f"samples must have shape (..., n, 3), got {given.shape}")
     if moments.shape != given.shape[-2:-1] or not np.isfinite(moments).all():
@@ -178,7 +176,7 @@ def field_ellipse(samples: ArrayLike, times: ArrayLike) -> FieldEllipse:
             f"times must be {given.shape[-2]} finite numbers, one for each sample, got shape {moments.shape}"
         )
     given = given[..., moments.argsort(kind="stable"), :]
-    present = np.isfinite(given).all(axis=-1)
+    present = np.asarray(np.isfinite(given).all(axis=-1))
     count = present.sum(axis=-1)
     if count.min(initial=_FEWEST) < _FEWEST:
         raise InputError(f"an ellipse needs at least {_FEWEST} samples of all three axes, got {count.min()}")

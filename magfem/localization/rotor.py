@@ -20,6 +20,7 @@ from magfem.fields.field import Placed, Scaled
 from magfem.fields.term_kinds import HARMONIC
 from magfem.fields.terms import Terms, frame_about
 from magfem.fitting import load_model
+from magfem.localization.real_numbers import real_numbers
 from magfem.typing import ArrayLike, Floats, Points, Tensors, Vectors
 
 _FORTH = np.array([np.eye(3), [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]])  # no turn, a quarter turn
@@ -95,10 +96,12 @@ def as_rotor(model: Model, rotation_axis: ArrayLike = (0.0, 0.0, 1.0)) -> Rotor:
         raise InputError(f"a rotor is a field model or its name, got {type(model).__name__}")
     if model.unit != "T":
         raise InputError("a rotor's field must be in T: multiply a coil's model by its current in A first")
-    axis = np.asarray(rotation_axis, dtype=float)
+    words = "rotation_axis must be three numbers, not all zero"
+    axis = real_numbers(rotation_axis, words)
     if axis.shape != (3,) or not np.isfinite(axis).all() or not axis.any():
-        raise InputError(f"rotation_axis must be three numbers, not all zero, got {rotation_axis!r}")
-    axis = axis / np.linalg.norm(axis)
+        raise InputError(f"{words}, got {rotation_axis!r}")
+    axis = axis / np.abs(axis).max()
+    axis /= np.linalg.norm(axis)
     moment = _moment(model)
     along = float(moment @ axis)
     across = float(np.linalg.norm(moment - along * axis))

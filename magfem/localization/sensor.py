@@ -11,7 +11,38 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform
 
 from magfem.errors import InputError
+from magfem.localization.real_numbers import real_numbers
 from magfem.typing import ArrayLike, Floats, Vectors
+
+MOST_NOISE = 100.0
+"""T: a noise or a step beyond it is in another unit."""
+
+
+def stated_deviation(noise: ArrayLike, name: str) -> Floats:
+    """(3,) T of one standard deviation, or of three. Raises InputError for what is none, beginning with `name`."""
+    words = f"{name} must be one or three standard deviations in T"
+    sigma = real_numbers(noise, words)
+    if sigma.shape not in ((), (3,)) or not np.all((sigma >= 0) & (sigma <= MOST_NOISE)):
+        raise InputError(f"{words}, got {noise!r}")
+    return np.broadcast_to(sigma, (3,)).copy()
+
+
+def stated_step(resolution: float, name: str) -> float:
+    """T, the step of readings. Raises InputError for what is none, beginning with `name`."""
+    words = f"{name} must be a step in T, or zero"
+    step = real_numbers(resolution, words)
+    if step.ndim or not 0 <= step <= MOST_NOISE:
+        raise InputError(f"{words}, got {resolution!r}")
+    return float(step)
+
+
+def stated_limit(saturation: float, name: str) -> float:
+    """T, where readings end. Raises InputError for what is no limit, beginning with `name`."""
+    words = f"{name} must be a positive field in T"
+    limit = real_numbers(saturation, words)
+    if limit.ndim or not limit > 0:
+        raise InputError(f"{words}, got {saturation!r}")
+    return float(limit)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -36,16 +67,11 @@ class Sensor:
         if not isinstance(self.pose, RigidTransform) or not self.pose.single:
             raise InputError("sensor: pose must be one scipy.spatial.transform.RigidTransform")
         if self.noise is not None:
-            noise = np.asarray(self.noise, dtype=float)
-            if noise.shape not in ((), (3,)) or not np.all((noise >= 0) & np.isfinite(noise)):
-                raise InputError(f"sensor: noise must be one or three standard deviations in T, got {self.noise!r}")
-            object.__setattr__(self, "noise", np.broadcast_to(noise, (3,)).copy())
-        if not 0 <= self.resolution < np.inf:
-            raise InputError(f"sensor: resolution must be a step in T, or zero, got {self.resolution!r}")
-        if not self.saturation > 0:
-            raise InputError(f"sensor: saturation must be a positive field in T, got {self.saturation!r}")
+            object.__setattr__(self, "noise", stated_deviation(self.noise, "sensor: noise"))
+        object.__setattr__(self, "resolution", stated_step(self.resolution, "sensor: resolution"))
+        object.__setattr__(self, "saturation", stated_limit(self.saturation, "sensor: saturation"))
         for name, shape in (("gain", (3, 3)), ("offset", (3,))):
-            value = np.asarray(getattr(self, name), dtype=float)
+            value = real_numbers(getattr(self, name), f"sensor: {name} must be {shape} finite numbers")
             if value.shape != shape or not np.isfinite(value).all():
                 raise InputError(f"sensor: {name} must be {shape} finite numbers")
             object.__setattr__(self, name, value)

@@ -15,6 +15,8 @@ import numpy as np
 
 from magfem.errors import InputError
 from magfem.localization.frequency import Frequency, find_frequency
+from magfem.localization.real_numbers import SAMPLES, TIMES, real_numbers
+from magfem.localization.sensor import stated_deviation, stated_step
 from magfem.typing import ArrayLike, Booleans, Floats, Integers, Vectors
 
 STRONGEST = 100.0  # T, beyond what any sensor reads: samples in another unit
@@ -135,12 +137,10 @@ def demodulate_several(
     static field, in samples of this length.
     """
     b, t, missing, saturated = _checked(samples, times, saturation)
-    try:
-        given = np.asarray(frequencies, dtype=float)
-    except (TypeError, ValueError):
-        given = np.empty(0)
+    words = "frequencies must be a list of numbers in Hz"
+    given = real_numbers(frequencies, words)
     if given.ndim != 1 or not given.size:
-        raise InputError(f"frequencies must be a list of numbers in Hz, got {frequencies!r}")
+        raise InputError(f"{words}, got {frequencies!r}")
     motors = [_constant(f, (), float(t.mean())) for f in given]
     sigma = None if noise is None else _stated_noise(noise, resolution)
     fitted = _fit(b, _design([one.turns(t) for one in motors]), missing, sigma, saturated, given)
@@ -152,7 +152,7 @@ def quadrature_covariance(times: ArrayLike, frequency: float, *, noise: ArrayLik
 
     For whole turns, evenly sampled, 2 σ²/n on the diagonal.
     """
-    t = np.asarray(times, dtype=float)
+    t = real_numbers(times, TIMES)
     sigma = _stated_noise(noise, resolution)
     X = _design([_constant(frequency, (), float(t.mean())).turns(t)])
     normal = X.T @ X
@@ -177,10 +177,7 @@ class _Fitted:
 
 def _checked(samples: ArrayLike, times: ArrayLike, saturation: float) -> tuple[Floats, Floats, Booleans, Integers]:
     """Samples with zeros where there are none, times, which are missing, and how many were saturated."""
-    try:
-        b, t = np.array(samples, dtype=float), np.asarray(times, dtype=float)
-    except (TypeError, ValueError):
-        raise InputError("samples and times must be real numbers, samples (..., n, 3) in T, times (n,) in s") from None
+    b, t = real_numbers(samples, SAMPLES), real_numbers(times, TIMES)
     if b.ndim < 2 or b.shape[-1] != 3 or t.shape != (b.shape[-2],):
         raise InputError(f"samples must be (..., n, 3) and times (n,), got {b.shape} and {t.shape}")
     if not b.size:
@@ -201,20 +198,16 @@ def _checked(samples: ArrayLike, times: ArrayLike, saturation: float) -> tuple[F
 
 
 def _stated_noise(noise: ArrayLike, resolution: float) -> Floats:
-    sigma = np.asarray(noise, dtype=float)
-    if sigma.shape not in ((), (3,)) or not np.all(sigma >= 0) or not np.isfinite(sigma).all():
-        raise InputError(f"noise must be one or three standard deviations in T, got {noise!r}")
-    return np.sqrt(np.broadcast_to(sigma, (3,)) ** 2 + resolution**2 / 12)  # of rounding: step/√12
+    step = stated_step(resolution, "resolution")
+    return np.asarray(np.sqrt(stated_deviation(noise, "noise") ** 2 + step**2 / 12))  # of rounding: step/√12
 
 
 def _constant(frequency: ArrayLike, lead: tuple[int, ...], middle: float) -> Frequency:
     """A stated frequency that does not drift."""
-    try:
-        given = np.asarray(frequency, dtype=float)
-    except (TypeError, ValueError):
-        given = np.asarray(np.nan)
+    words = "a rotation frequency must be a positive number in Hz"
+    given = real_numbers(frequency, words)
     if not np.all(np.isfinite(given) & (given > 0)):
-        raise InputError(f"a rotation frequency must be a positive number in Hz, got {frequency!r}")
+        raise InputError(f"{words}, got {frequency!r}")
     try:
         each = np.array(np.broadcast_to(given, lead))
     except ValueError:

@@ -33,6 +33,7 @@ from magfem.errors import InputError
 from magfem.fields.field import Field
 from magfem.fitting import load_model
 from magfem.localization.localize import localize
+from magfem.localization.real_numbers import real_numbers
 from magfem.localization.rotor import Model, Rotor, as_rotor
 from magfem.localization.sensor import Sensor
 from magfem.typing import ArrayLike, Floats, Points, Vectors
@@ -168,7 +169,7 @@ def stator_influence(
     coils = [load_model(coil) if isinstance(coil, str) else coil for coil in (inner, outer)]
     if any(coil.unit != "T/A" for coil in coils):
         raise InputError("a stator's coils need fields in T/A, per ampere")
-    far = np.atleast_1d(np.asarray(distances, dtype=float))
+    far = np.atleast_1d(real_numbers(distances, "distances must be numbers (k,) in m"))
     if far.ndim != 1 or not np.isfinite(far).all() or far.min(initial=np.inf) < 4e-3:
         raise InputError("distances must be numbers (d,) in m, at least 4 mm: nearer is within the motor")
     if not (np.isfinite(current) and current > 0):

@@ -9,6 +9,7 @@ from scipy.stats import chi2
 
 from magfem.errors import InputError
 from magfem.localization.frequency import find_frequency
+from magfem.localization.real_numbers import SAMPLES, TIMES, real_numbers
 from magfem.localization.signal import demodulate
 from magfem.typing import ArrayLike
 
@@ -47,7 +48,7 @@ def synchrony(samples: ArrayLike, times: ArrayLike, asked: float, *, noise: Arra
     frequency too, a hundred times weaker than the rotor's: see `stator_influence`. Raises InputError for samples of
     another shape.
     """
-    b, t = np.asarray(samples, dtype=float), np.asarray(times, dtype=float)
+    b, t = real_numbers(samples, SAMPLES), real_numbers(times, TIMES)
     if b.ndim != 2 or b.shape[1:] != (3,):
         raise InputError(f"synchrony looks at one record of one sensor, (n, 3) in T, got {b.shape}")
     at_asked = demodulate(b, t, asked, noise=noise)

@@ -23,6 +23,7 @@ from magfem.localization.localize import localize, whitened
 from magfem.localization.motion import Dynamics, Likelihoods, ProcessNoise, Smoothed, dynamics, kalman_filter, smooth
 from magfem.localization.orientation import orientation
 from magfem.localization.pose import Pose
+from magfem.localization.real_numbers import SAMPLES, TIMES, real_numbers
 from magfem.localization.rotor import Model, as_rotor
 from magfem.localization.sensor import Sensors, as_sensors
 from magfem.localization.window_likelihood import Windows, likelihoods, misfit, moved
@@ -105,21 +106,22 @@ def track(
 
     Raises InputError for fewer than three windows, ConvergenceError where the track did not converge and `strict`.
     """
-    begin = np.asarray(starts, dtype=float)
+    begin = real_numbers(starts, "starts must be real numbers (w,) in s")
     if begin.ndim != 1 or begin.size < 3 or not np.all(np.diff(begin) > 0):
         raise InputError("a track needs three windows or more, with starts (w,) in s that increase")
-    if np.shape(samples)[:1] != begin.shape:
-        raise InputError(f"{begin.size} windows need samples (w, …), got {np.shape(samples)}")
+    b = real_numbers(samples, SAMPLES)
+    if b.shape[:1] != begin.shape:
+        raise InputError(f"{begin.size} windows need samples (w, …), got {b.shape}")
     rotor, array = as_rotor(model, rotation_axis), as_sensors(sensors)
-    samples, begin = _whole(samples, begin)
-    poses = localize(samples, times, rotor, frequency, sensors, strict=False)
-    middles = begin + float(np.mean(np.asarray(times, dtype=float)))
+    b, begin = _whole(b, begin)
+    poses = localize(b, times, rotor, frequency, sensors, strict=False)
+    middles = begin + float(np.mean(real_numbers(times, TIMES)))
     with one_thread_for_algebra():
         seen = Windows(rotor, array, whitened(poses.fields, array))
         found = [_follow(seen, middles, poses, path, noise) for path in _paths(poses)]
     found = _distinct(sorted(found, key=lambda one: -one.log_evidence))
     if near is not None:
-        where, likeliest = np.asarray(near, dtype=float), found[0].log_evidence
+        where, likeliest = real_numbers(near, "near must be a position (3,) in m"), found[0].log_evidence
         found.sort(key=lambda one: (one.log_evidence < likeliest - 10.0, _apart(one, where)))
     best = found[0]
     if strict and not best.converged:
@@ -139,7 +141,7 @@ def windows(
     samples: (..., n, 3), times (n,) s, evenly sampled. Returns samples (w, ..., k, 3), times (k,) within a window, and
     starts (w,) s. Raises InputError where no window fits or the times are uneven.
     """
-    b, t = np.asarray(samples, dtype=float), np.asarray(times, dtype=float)
+    b, t = real_numbers(samples, SAMPLES), real_numbers(times, TIMES)
     if t.ndim != 1 or t.size < 2 or b.shape[-2:] != (t.size, 3):
         raise InputError(f"samples must be (..., n, 3) and times (n,), got {b.shape} and {t.shape}")
     interval = np.ptp(t) / (t.size - 1)
@@ -155,9 +157,8 @@ def windows(
     return np.moveaxis(cut, -3, 0), t[:count] - t[0], t[first]
 
 
-def _whole(samples: ArrayLike, begin: Floats) -> tuple[Floats, Floats]:
+def _whole(b: Floats, begin: Floats) -> tuple[Floats, Floats]:
     """The windows, and their starts, in which every sensor took enough samples to say something."""
-    b = np.asarray(samples, dtype=float)
     axes = (*range(1, b.ndim - 2), b.ndim - 1)
     enough = (np.isfinite(b).sum(axis=-2, keepdims=True) >= FEWEST_SAMPLES).all(axis=axes).reshape(-1)
     if enough.sum() < 3:

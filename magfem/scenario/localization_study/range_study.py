@@ -103,7 +103,10 @@ def run(study: RangeStudy) -> RangeErrors:
         shape = (study.distances.size, study.draws)
         beta = generator.uniform(study.beta[0], study.beta[1], shape)
         true = drawn_poses(np.broadcast_to(study.distances[:, None], shape), beta, generator)
-        clean = simulated_samples(rotor, true.position, true.axis, study.times, study.frequency, phase=true.phase)
+        # Far beyond the model's region, where what is left of the field is its dipole's.
+        clean = simulated_samples(
+            rotor, true.position, true.axis, study.times, study.frequency, phase=true.phase, outside="extrapolate"
+        )
         sensor = noise.sensor
         pose = localize(
             noise.added(clean, generator), study.times, rotor, study.frequency, sensor, near=true.position, strict=False
