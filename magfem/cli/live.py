@@ -17,10 +17,13 @@ from magfem.errors import InputError
 from magfem.units import one_line
 
 if TYPE_CHECKING:
+    from magfem.localization.live_track import LiveTrack
     from magfem.samples.recording import Recording, Stream
     from magfem.samples.recording_csv import RecordingColumns
 
 _INPUT = Path("standard input")
+MOST_TOLD = 10
+"""Lines left out in a row that are told one by one: a wire that garbles all of them would fill the terminal."""
 
 
 def localize_live(options: Namespace, output: Path | None) -> int:
@@ -59,9 +62,11 @@ class _Live:
 
     def __init__(self, options: Namespace, stream: Stream, located: Located, keep: bool) -> None:
         self.options, self.stream, self.located, self.keep = options, stream, located, keep
+        self.track = self._new_track()
         self.poses = self.lines_left_out = 0
         self.reason = ""  # why a window gave no pose
         self._rate_checked = False
+        self._in_a_row = 0  # lines left out since one could be read
 
     def read(self, lines: Iterator[tuple[int, str]], rate: float | None) -> None:
         """All lines, to the end of the input."""
@@ -91,6 +96,8 @@ class _Live:
             if self.stream.restarts > restarts:
                 restarts = self.stream.restarts
                 _complain(f"the time went back, windows begin anew [{_INPUT}: line {number}]")
+                self.track = self._new_track()
+            self._in_a_row = 0
             self._localize(complete)
         self._localize(self.stream.end())
 
@@ -101,7 +108,11 @@ class _Live:
                 self.located.setup.check_rate(piece)
                 self._rate_checked = True
             missed = len(self.located.left_out)
-            for entry in self.located.add(piece, start, self.stream.windows.length):
+            if self.track is None:
+                found = self.located.add(piece, start, self.stream.windows.length)
+            else:
+                found = self.located.follow(piece, start, self.track)
+            for entry in found:
                 self.poses += 1
                 self._print(json.dumps(entry, allow_nan=False), pose_line(entry))
             for one in self.located.left_out[missed:]:
@@ -111,6 +122,14 @@ class _Live:
                 self.located.entries.clear()
                 self.located.left_out.clear()
 
+    def _new_track(self) -> LiveTrack | None:
+        from magfem.localization.live_track import LiveTrack
+
+        if not self.options.track:
+            return None
+        near = self.located.near[0] if self.located.near else None
+        return LiveTrack(self.located.setup, self.stream.windows, near)
+
     def _print(self, data: str, text: str) -> None:
         if self.options.json:
             print(data, flush=True)
@@ -119,7 +138,11 @@ class _Live:
 
     def _leave_out(self, why: str) -> None:
         self.lines_left_out += 1
-        _complain(f"line left out: {why}")
+        self._in_a_row += 1
+        if self._in_a_row <= MOST_TOLD:
+            _complain(f"line left out: {why}")
+        elif self._in_a_row == MOST_TOLD + 1:
+            _complain("more lines are left out untold, until one can be read")
 
 
 def _lines() -> Iterator[tuple[int, str]]:

@@ -84,7 +84,9 @@ def add(commands: CommandLine) -> None:
     )
     windows.add_argument("--step", metavar="SECONDS", help="from one window to the next (default: the window)")
     windows.add_argument(
-        "--track", action="store_true", help="all windows as one track of a magnet that moves smoothly"
+        "--track",
+        action="store_true",
+        help="a magnet that moves smoothly: every window is judged by the others; live, by those before it",
     )
 
 
@@ -95,9 +97,8 @@ def run(options: Namespace) -> int:
     if options.samples == "-":
         from magfem.cli.live import localize_live
 
-        for option in ("picture", "track"):
-            if getattr(options, option):
-                raise InputError(f"--{option} is for samples in a file, not for live ones")
+        if options.picture:
+            raise InputError("--picture is for samples in a file, not for live ones")
         return localize_live(options, output)
     for option in ("step", "track"):
         if getattr(options, option) and not options.window:

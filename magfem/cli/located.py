@@ -9,6 +9,7 @@ from magfem.errors import ConvergenceError, InputError
 
 if TYPE_CHECKING:
     from magfem.localization import Pose
+    from magfem.localization.live_track import LiveTrack
     from magfem.localization.recorded import Setup
     from magfem.samples.recording import Recording, Windows
 
@@ -44,6 +45,19 @@ class Located:
         if self.near is not None:
             self.near = poses
         return found
+
+    def follow(self, piece: Recording, start: float, live: LiveTrack) -> list[dict[str, Any]]:
+        """What is believed after one more window of a track; nothing when it gives none."""
+        from magfem.localization.poses_file import belief_to_dict
+
+        length = live.windows.length
+        try:
+            belief, names = live.add(piece, start)
+        except (InputError, ConvergenceError) as error:
+            self.left_out.append({"time": start + length / 2, "reason": str(error)})
+            return []
+        self.entries.append(belief_to_dict(belief, (start, start + length), names))
+        return self.entries[-1:]
 
     def poses(self, piece: Recording) -> tuple[tuple[Pose, ...], tuple[str, ...]]:
         """The poses of a window, and the names of the sensors that took part. Raises InputError, ConvergenceError."""

@@ -24,8 +24,10 @@ def pose_line(entry: dict[str, Any]) -> str:
         f"t = {entry['time']:.6g} s: position ({x}, {y}, {z}) mm ± {_millimetres(entry['position_deviation'])} mm, "
         f"axis ({axis}) ± {_degrees(entry['axis_deviation'])} deg, {entry['frequency']:.6g} Hz"
     )
-    others = len(entry["branches"]) - 1
-    return f"{text}, one of {others + 1} branches" if entry["ambiguous"] and others else text
+    if entry.get("faulty"):
+        text += ", does not fit the windows before"
+    branches = len(entry["branches"])
+    return f"{text}, one of {branches} branches" if entry["ambiguous"] and branches > 1 else text
 
 
 def poses_text(data: dict[str, Any], setup: Setup, recording: Recording, files: Sequence[str]) -> str:

@@ -10,7 +10,7 @@ from magfem.localization.calibration import (
 )
 from magfem.localization.design import Placement, Workspace, needed_noise, place_sensors, reach, workspace
 from magfem.localization.dipole_pose import DipolePoses, dipole_poses
-from magfem.localization.following import Belief, follow
+from magfem.localization.following import Belief, follow, follow_pose
 from magfem.localization.frequency import Frequency, Spectrum, find_frequency, spectrum
 from magfem.localization.localize import localize, localize_several, locate_field
 from magfem.localization.motion import ProcessNoise
@@ -49,6 +49,7 @@ __all__ = [
     "dipole_poses",
     "find_frequency",
     "follow",
+    "follow_pose",
     "localize",
     "localize_several",
     "locate_field",

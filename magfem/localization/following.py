@@ -76,9 +76,25 @@ class Belief:
     @property
     def covariance(self) -> Floats:
         """(6, 6) of position and axis."""
-        across = np.eye(6)
-        across[3:, 3:] -= np.outer(self.axis, self.axis)
-        return np.asarray(across @ self.state_covariance[0, :6, :6] @ across)
+        return np.asarray(self.covariances[0])
+
+    @property
+    def covariances(self) -> Floats:
+        """(h, 6, 6) of position and axis, of every hypothesis."""
+        axis = self.state[:, 3:6] / np.linalg.norm(self.state[:, 3:6], axis=-1, keepdims=True)
+        across = np.tile(np.eye(6), (len(axis), 1, 1))
+        across[:, 3:, 3:] -= axis[:, :, None] * axis[:, None, :]
+        return np.asarray(across @ self.state_covariance[:, :6, :6] @ across)
+
+    @property
+    def position_deviation(self) -> float:
+        """m, root of the mean square distance from the true position that the covariance states."""
+        return float(np.sqrt(np.trace(self.covariance[:3, :3])))
+
+    @property
+    def axis_deviation(self) -> float:
+        """rad, root of the mean square angle from the true axis that the covariance states."""
+        return float(np.sqrt(np.trace(self.covariance[3:, 3:])))
 
     @property
     def ambiguous(self) -> bool:
@@ -106,15 +122,34 @@ def follow(
     `Rotor` as `model` saves building it anew. Otherwise as `localize`. Raises InputError for a window that is not after
     the last.
     """
-    rotor, array = as_rotor(model, rotation_axis), as_sensors(sensors)
-    time = start + float(np.mean(real_numbers(times, TIMES)))
-    if belief is not None and not time > belief.time:
-        raise InputError(f"windows must follow each other in time: {time:g} s is not after {belief.time:g} s")
+    rotor = as_rotor(model, rotation_axis)
     pose = localize(samples, times, rotor, frequency, sensors, strict=False)
+    time = start + float(np.mean(real_numbers(times, TIMES)))
+    return follow_pose(belief, pose, time, rotor, sensors, noise=noise, near=near)
+
+
+def follow_pose(
+    belief: Belief | None,
+    pose: Pose,
+    time: float,
+    model: Model,
+    sensors: Sensors = None,
+    *,
+    noise: ProcessNoise,
+    near: ArrayLike | None = None,
+    rotation_axis: ArrayLike = (0.0, 0.0, 1.0),
+) -> Belief:
+    """As `follow`, after a window whose samples, about `time` (s), gave `pose` alone, with the same model and sensors.
+
+    Not every window needs the same sensors, as long as they share a frame.
+    """
+    rotor, array = as_rotor(model, rotation_axis), as_sensors(sensors)
     if not isinstance(noise, ProcessNoise):
         raise InputError("follow needs the process noise, such as track finds: ProcessNoise(1e-8, 1e-5)")
     if pose.position.ndim != 1:
         raise InputError("follow takes one window at a time; a whole record is for track")
+    if belief is not None and not time > belief.time:
+        raise InputError(f"windows must follow each other in time: {time:g} s is not after {belief.time:g} s")
     with one_thread_for_algebra():
         measured = whitened(pose.fields, array)
         prior = _first(pose, near) if belief is None else _predicted(belief, pose, time, noise)

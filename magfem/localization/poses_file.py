@@ -12,11 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from magfem.localization.orientation import orientation
+from magfem.localization.following import Belief
+from magfem.localization.orientation import orientation, phase_of
 from magfem.localization.pose import Branch, Pose
 from magfem.localization.sensor import Sensor
 from magfem.localization.tracking import Track
-from magfem.typing import Floats
+from magfem.typing import Floats, Points, Vectors
 
 FORMAT, VERSION = "magfem-poses", 1
 FAULTY = "the samples of this window do not fit the track"
@@ -110,27 +111,71 @@ def track_to_dicts(track: Track, starts: Floats, length: float, sensors: Sequenc
     return found
 
 
+def belief_to_dict(belief: Belief, window: tuple[float, float], sensors: Sequence[str]) -> dict[str, Any]:
+    """What is believed after a window, as plain data; its pose must be of the clock that `window` (s) is of.
+
+    `branches` are the hypotheses, their log_likelihood that of all windows so far, less that of the likeliest. The
+    deviation of a phase is that of the window alone.
+    """
+    pose = belief.pose
+    middle = sum(window) / 2
+    variances = np.array([one.covariance[5, 5] for one in pose.branches])
+    branches = []
+    for h, state in enumerate(belief.state):
+        position, axis = state[:3], belief.frame[h, :, 2]
+        own = variances[_nearest(position, axis, pose.branches)]
+        covariance = _about_own_axes(belief.covariances[h], belief.frame[h], float(own))
+        phase = phase_of(belief.frame[h])
+        branches.append(_branch(Branch(position, axis, phase, covariance, belief.log_weight[h])))
+    said = ((belief.faulty, FAULTY), (belief.ambiguous, AMBIGUOUS))
+    return {
+        **pose_to_dict(pose, middle, window, sensors),
+        **branches[0],
+        "velocity": belief.velocity.tolist(),
+        "moment_direction": belief.moment_direction(middle).tolist(),
+        "position_deviation": _finite(belief.position_deviation),
+        "axis_deviation": _finite(belief.axis_deviation),
+        "faulty": belief.faulty,
+        "ambiguous": belief.ambiguous,
+        "warnings": [words for flag, words in said if flag],
+        "branches": branches,
+    }
+
+
 def _tracked(track: Track, w: int, start: float) -> dict[str, Any]:
     """Window w of a track, its covariance that of a `Branch`: of turns about the rotor's axes at time zero."""
     position, axis = track.position[w], track.axis[w]
-    candidates = [one for one in track.poses.branches if np.isfinite(one.log_likelihood[w])]
-    apart = [
-        np.linalg.norm(one.position[w] - position) / np.linalg.norm(position) + np.linalg.norm(one.axis[w] - axis)
-        for one in candidates
+    candidates = [
+        Branch(one.position[w], one.axis[w], one.phase[w], one.covariance[w], one.log_likelihood[w])
+        for one in track.poses.branches
+        if np.isfinite(one.log_likelihood[w])
     ]
-    own = candidates[int(np.argmin(apart))]
+    own = candidates[_nearest(position, axis, candidates)]
     frequency = float(np.broadcast_to(track.poses.frequency, track.times.shape)[w])
-    phase = float(np.angle(np.exp(1j * (float(own.phase[w]) - 2 * np.pi * frequency * start))))
-    frame = orientation(axis, phase)
+    phase = float(np.angle(np.exp(1j * (float(own.phase) - 2 * np.pi * frequency * start))))
+    deviation = float(np.broadcast_to(track.poses.turning.deviation, track.times.shape)[w])
+    middle = track.times[w]  # from where an uncertain frequency carries the phase to time zero, not to the start alone
+    variance = own.covariance[5, 5] + (2 * np.pi * deviation) ** 2 * (middle**2 - (middle - start) ** 2)
+    covariance = _about_own_axes(track.covariance[w], orientation(axis, phase), float(variance))
+    return _branch(Branch(position, axis, np.asarray(phase), covariance, np.asarray(track.log_evidence)))
+
+
+def _nearest(position: Points, axis: Vectors, branches: Sequence[Branch]) -> int:
+    """Which of a window's branches is the nearest to a pose."""
+    size = np.linalg.norm(position)
+    apart = [np.linalg.norm(one.position - position) / size + np.linalg.norm(one.axis - axis) for one in branches]
+    return int(np.argmin(apart))
+
+
+def _about_own_axes(covariance: Floats, frame: Floats, phase_variance: float) -> Floats:
+    """(6, 6) of position and turns about the rotor's axes, the columns of `frame`, from that of position and axis."""
     # A small change da of the axis is the turn −ŷ·da about x̂ and x̂·da about ŷ.
     turns = np.zeros((6, 6))
     turns[:3, :3] = np.eye(3)
     turns[3, 3:], turns[4, 3:] = -frame[:, 1], frame[:, 0]
-    covariance = turns @ track.covariance[w] @ turns.T
-    deviation = float(np.broadcast_to(track.poses.turning.deviation, track.times.shape)[w])
-    middle = track.times[w]  # from where an uncertain frequency carries the phase to time zero, not to the start alone
-    covariance[5, 5] = own.covariance[w, 5, 5] + (2 * np.pi * deviation) ** 2 * (middle**2 - (middle - start) ** 2)
-    return _branch(Branch(position, axis, np.asarray(phase), covariance, np.asarray(track.log_evidence)))
+    found: Floats = turns @ covariance @ turns.T
+    found[5, 5] = phase_variance
+    return found
 
 
 def _branch(one: Branch) -> dict[str, Any]:

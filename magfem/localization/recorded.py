@@ -57,6 +57,11 @@ class Setup:
             raise InputError(f"the samples are of a sensor {quoted(name)}: where it stands must be stated")
         raise InputError(f"there is no sensor {quoted(name)}: known are {known}")
 
+    def check_track(self) -> None:
+        """Raise InputError where what turns cannot be followed as a track."""
+        if self.motors > 1 or self.drift or self.swing:
+            raise InputError("a track is that of a single magnet, whose frequency does not drift and that turns evenly")
+
     def check_rate(self, recording: Recording) -> None:
         """Raise InputError when a frequency is half the rate of the samples or more: it would seem to be another."""
         interval = recording.interval
@@ -104,8 +109,7 @@ def track_recording(
     its windows, those of windows with too few samples, and the sensors' names. Raises InputError and ConvergenceError
     as `track` does.
     """
-    if setup.motors > 1 or setup.drift or setup.swing:
-        raise InputError("a track is that of a single magnet, whose frequency does not drift and that turns evenly")
+    setup.check_track()
     times, samples, names = recording.evenly()
     sensors = [setup.sensor(name) for name in names]
     cut, within, starts = windows(samples, times, length, step)

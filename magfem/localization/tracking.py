@@ -112,6 +112,12 @@ def track(
     b = real_numbers(samples, SAMPLES)
     if b.shape[:1] != begin.shape:
         raise InputError(f"{begin.size} windows need samples (w, …), got {b.shape}")
+    length = float(np.ptp(real_numbers(times, TIMES)))
+    if np.diff(begin).min() < (1 - 1e-9) * length:
+        raise InputError(
+            f"windows of a track must not overlap, their samples would count twice: one begins every "
+            f"{np.diff(begin).min():g} s, and they are {length:g} s long"
+        )
     rotor, array = as_rotor(model, rotation_axis), as_sensors(sensors)
     b, begin = _whole(b, begin)
     poses = localize(b, times, rotor, frequency, sensors, strict=False)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -196,4 +197,17 @@ def recording_of(rows: list[tuple[float, str, tuple[float, float, float]]], sour
         np.array([index[name] for _, name, _ in rows], dtype=np.int64),
         tuple(names),
         source,
+    )
+
+
+def joined(pieces: Sequence[Recording]) -> Recording:
+    """Recordings that follow each other, as one."""
+    names = sorted({name for one in pieces for name in one.sensors})
+    sensor = [np.array([names.index(name) for name in one.sensors], dtype=np.int64)[one.sensor] for one in pieces]
+    return Recording(
+        np.concatenate([one.times for one in pieces]),
+        np.concatenate([one.B for one in pieces]),
+        np.concatenate(sensor),
+        tuple(names),
+        pieces[0].source,
     )

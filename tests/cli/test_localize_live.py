@@ -42,10 +42,10 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def feed(here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Feed:
     """Run the command on a whole input; its exit code, what it prints on stdout and on stderr."""
 
-    def run(text: str | bytes, *words: str) -> tuple[int, str, str]:
+    def run(text: str | bytes, *words: str, model_only: bool = False) -> tuple[int, str, str]:
         data = text if isinstance(text, bytes) else text.encode()
         monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(data)))
-        code = main([*LIVE, *words])
+        code = main([*(LIVE[:5] if model_only else LIVE), *words])
         read = capsys.readouterr()
         return code, read.out, read.err
 
@@ -115,6 +115,87 @@ def test_garbled_lines_are_told_and_left_out(feed: Feed) -> None:
     assert all(pose["position"] == pytest.approx(TRUE.position, abs=1e-7) for pose in objects(out))
 
 
+def test_a_wire_that_garbles_everything_does_not_fill_the_terminal(feed: Feed) -> None:
+    rows = lines()
+    rows[100:400] = ["?"] * 300
+    code, out, err = feed(joined(rows), "-q", "-o", "poses.json")
+    assert code == 0 and len(out.splitlines()) == 8  # the five seconds after the gap begin within a window
+    told = err.splitlines()
+    assert len([line for line in told if "line left out" in line]) == 10 and "left out untold" in told[10]
+    assert json.loads(Path("poses.json").read_text())["lines_left_out"] == 300
+
+
+CARD = """
+kind = "sensors"
+[[sensors]]
+name = "left"
+position = ["-10 mm", "0 mm", "0 mm"]
+noise = "3 uT"
+[[sensors]]
+name = "right"
+position = ["10 mm", "0 mm", "0 mm"]
+noise = "3 uT"
+"""
+
+
+def moving(count: int, begin: float = 0.0) -> tuple[list[str], list[Turning]]:
+    """Lines of two sensors that see a magnet on an arc about 30 mm away, in windows of 2 s, and where it was."""
+    path = [
+        Turning([0.01 * np.sin(k / 10), 0.008 * np.cos(k / 12), 0.028 + 1e-4 * k], [0.3, np.sin(k / 15), 1.0])
+        for k in range(count)
+    ]
+    rng, rows = np.random.default_rng(1), []
+    for k, one in enumerate(path):
+        t = 2.0 * k + np.arange(40) / 20
+        seen = [one.field(place, t) + 3e-6 * rng.normal(size=(40, 3)) for place in ([-0.01, 0, 0], [0.01, 0, 0])]
+        for i in range(40):
+            for name, B in zip(("left", "right"), seen, strict=True):
+                rows.append(f"{begin + t[i]:.3f},{name}," + ",".join(f"{1e6 * b:.2f}" for b in B[i]))
+    return rows, path
+
+
+def test_a_live_track_is_nearer_than_its_windows(feed: Feed, here: Path) -> None:
+    """Filtered by the windows before, with the process noise that they tell, no prior, and covariances that tell how
+    near; a window that something else disturbed is named and moves nothing far; a clock set back begins anew.
+    """
+    Path("pair.toml").write_text(CARD)
+    rows, path = moving(40)
+    disturbed = 25
+    for i in range(80 * disturbed, 80 * disturbed + 80):
+        t, name, *B = rows[i].split(",")
+        shaken = [f"{float(b) + 150 * np.sin(4 * float(t)):.2f}" for b in B]
+        rows[i] = ",".join([t, name, *shaken])
+    text = joined(rows, "t,sensor,bx_uT,by_uT,bz_uT")
+    words = ["--sensors", "pair.toml", "--frequency", "0.5", "--json", "-q"]
+
+    def off(out: str) -> Any:
+        poses = objects(out)
+        assert len(poses) == 40
+        return np.array([pose["position"] for pose in poses]) - [one.position for one in path]
+
+    _, alone, _ = feed(text, *words, model_only=True)
+    code, out, err = feed(text, *words, "--track", model_only=True)
+    assert code == 0 and err == ""
+    poses = objects(out)
+    assert [k for k, pose in enumerate(poses) if pose["faulty"]] == [disturbed]
+    later = np.r_[8:disturbed, disturbed + 1 : 40]
+
+    def size(errors: Any) -> float:
+        return float(np.sqrt((errors[later] ** 2).sum(axis=1).mean()))
+
+    assert size(off(out)) < 0.75 * size(off(alone)) and np.linalg.norm(off(out)[disturbed]) < 3e-3
+    normalised = [
+        off(out)[k] @ np.linalg.solve(np.array(poses[k]["covariance"])[:3, :3], off(out)[k]) / 3 for k in later
+    ]
+    assert 0.5 < np.mean(normalised) < 1.7
+    axes = np.array([pose["axis"] for pose in poses])
+    moments = np.array([pose["moment_direction"] for pose in poses])
+    assert np.abs(np.einsum("ki,ki->k", axes, moments)).max() < 1e-9
+    again = joined(rows[: 80 * 20] + moving(5, 1.0)[0], "t,sensor,bx_uT,by_uT,bz_uT")
+    code, out, err = feed(again, *words, "--track", model_only=True)
+    assert code == 0 and "the time went back" in err and len(objects(out)) == 24  # one window was not over
+
+
 def test_with_a_rate_the_clock_goes_on_over_garbled_lines(feed: Feed) -> None:
     """Were they not counted, the rotation would seem to jump, and the position with it."""
     rows = [line.split(",", 1)[1] for line in lines()]
@@ -182,7 +263,8 @@ def test_several_sensors_one_of_them_unknown(
         (joined(lines()), "--frequency 10", "10 Hz is not below half the rate of the samples (20 Hz)"),
         (joined(lines()), "--window 0", "--window must be a positive number of s"),
         (joined(lines()), "--picture p.png", "--picture is for samples in a file"),
-        (joined(lines()), "--track", "--track is for samples in a file"),
+        (joined(lines()), "--track --step 1", "windows of a track must not overlap"),
+        (joined(lines()), "--track --swing", "a track is that of a single magnet"),
         (joined(lines()), "-o nowhere/p.json", "there is no folder"),
     ],
 )

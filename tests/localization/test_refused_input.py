@@ -65,6 +65,10 @@ REFUSED: dict[str, tuple[Callable[[], object], str]] = {
     "windows of words": (lambda: windows(WORDS, TIMES, 1.0), "samples must be real numbers"),
     "starts of words": (lambda: track(TRACK, TIMES, ROTOR, 1.0, starts="abcd"), "starts must be real numbers"),
     "too few starts": (lambda: track(TRACK, TIMES, ROTOR, 1.0, starts=[0, 2, 4]), "3 windows need samples"),
+    "overlapping windows": (
+        lambda: track(TRACK, TIMES, ROTOR, 1.0, starts=[0, 1, 2, 3]),
+        "windows of a track must not overlap",
+    ),
     "follow from words": (
         lambda: follow(None, SAMPLES, TIMES, ROTOR, 1.0, noise=NOISE, near="here"),
         "near must be a position",
