@@ -144,7 +144,7 @@ def tracks(found: Tracks) -> list[Picture]:
 
 
 def _path(found: Tracks, one: PathResult) -> Picture:
-    times = found.study.length * np.arange(len(one.position))
+    times = found.study.sampling.duration * np.arange(len(one.position))
     methods = (
         ("published, one sensor", one.published, ORANGE),
         ("each window alone, two sensors", one.alone, PURPLE),
@@ -188,9 +188,9 @@ def _path(found: Tracks, one: PathResult) -> Picture:
         f"track_{one.name.replace(' ', '_')}",
         content,
         f"The {one.name} path as localized by three methods, and their errors along it.",
-        f"The {one.name} path (broad grey) in {len(one.position)} windows of {found.study.length:g} s, the axis as "
-        "arrows, the sensors as squares, and errors along it (Fig. 6.7). Dashed: the limits of 1 mm and 3°, for root "
-        "mean squares. The published algorithm begins at the true place and hands its faults on.",
+        f"The {one.name} path (broad grey) in {len(one.position)} windows of "
+        f"{found.study.sampling.duration:g} s, the axis as arrows, the sensors as squares, and errors "
+        "along it (Fig. 6.7). Dashed: the limits of 1 mm and 3°, for root mean squares. The published algorithm begins at the true place and hands its faults on.",
     )
 
 
@@ -295,8 +295,9 @@ def workspaces(found: WorkspaceMaps) -> list[Picture]:
         "workspaces",
         content,
         "Maps of the bounds of position and axis about one sensor and about pairs of sensors.",
-        f"Cramér–Rao bound about sensors (squares) of {study.noise.deviation * MICRO:.3g} µT with {study.duration:g} s "
-        f"at {study.rate:g} Hz, medians over all directions of the rotor’s axis. White: the limits of "
+        f"Cramér–Rao bound about sensors (squares) of {study.noise.deviation * MICRO:.3g} µT with "
+        f"{study.sampling.duration:g} s at {study.sampling.rate:g} Hz, medians over all directions of the "
+        "rotor’s axis. White: the limits of "
         f"{MILLI * study.position:g} mm and {DEGREE * study.axis:g}°. Beyond the dashed line a wrong branch is "
         "likelier than once in 200; with one sensor the branch must be known.",
     )

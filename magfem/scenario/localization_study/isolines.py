@@ -19,6 +19,7 @@ from magfem.scenario.localization_study.poses import (
     pose_errors,
     root_mean_square,
 )
+from magfem.scenario.localization_study.sampling import Sampling, read_frequency, read_sampling
 from magfem.scenario.localization_study.study import Comparison
 from magfem.scenario.plain_values import whole_number
 from magfem.typing import Floats
@@ -48,15 +49,9 @@ class IsolineStudy:
     draws: int
     band_draws: int
     frequency: float
-    rate: float
-    duration: float
+    sampling: Sampling
     seed: int
     limits: Mapping[str, float]
-
-    @property
-    def times(self) -> Floats:
-        """(n,) s."""
-        return np.arange(round(self.duration * self.rate)) / self.rate
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -86,6 +81,7 @@ def read(table: Table) -> IsolineStudy:
         *("kind", "study", "name", "source", "model", "strengths", "beta", "draws", "band_draws", "frequency"),
         *("rate", "duration", "seed", "sensor", "limits"),
     )
+    sampling = read_sampling(table)
     return IsolineStudy(
         model=table.text("model"),
         strengths=quantities(table, "strengths", "flux density"),
@@ -93,9 +89,8 @@ def read(table: Table) -> IsolineStudy:
         noise=read_noise(table.table("sensor")),
         draws=whole_number(table, "draws", 200, 2),
         band_draws=whole_number(table, "band_draws", 1000, 2),
-        frequency=table.quantity("frequency", "frequency"),
-        rate=table.quantity("rate", "frequency"),
-        duration=table.quantity("duration", "time"),
+        frequency=read_frequency(table, sampling),
+        sampling=sampling,
         seed=whole_number(table, "seed", 0, 0),
         limits=_limits(table),
     )
@@ -153,12 +148,12 @@ def _isoline(
     """Root mean squares along the second axis of poses at `beta` (m, draws)."""
     r = isoline_distance(rotor, np.asarray(strength), beta)
     true = drawn_poses(r, beta, generator)
-    clean = simulated_samples(rotor, true.position, true.axis, study.times, study.frequency, phase=true.phase)
+    clean = simulated_samples(rotor, true.position, true.axis, study.sampling.times, study.frequency, phase=true.phase)
     samples = study.noise.added(clean, generator)
     sensor = study.noise.sensor
-    pose = localize(samples, study.times, rotor, study.frequency, sensor, near=true.position, strict=False)
-    bound = pose_bound(rotor, true.position, true.axis, sensor, times=study.times, frequency=study.frequency)
-    old = localize_as_published(samples, study.times, isolines, near=true.position)
+    pose = localize(samples, study.sampling.times, rotor, study.frequency, sensor, near=true.position, strict=False)
+    bound = pose_bound(rotor, true.position, true.axis, sensor, times=study.sampling.times, frequency=study.frequency)
+    old = localize_as_published(samples, study.sampling.times, isolines, near=true.position)
     errors, published = pose_errors(pose.position, pose.axis, true), pose_errors(old.position, old.axis, true)
     return {
         "found": {name: root_mean_square(getattr(errors, name), axis=1) for name in NAMES},

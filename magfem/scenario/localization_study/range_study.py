@@ -11,6 +11,7 @@ from magfem.geometry.card import Table
 from magfem.localization import as_rotor, localize, pose_bound, simulated_samples
 from magfem.scenario.localization_study.noise import UNIFORM, Noise, quantities
 from magfem.scenario.localization_study.poses import drawn_poses, pose_errors, root_mean_square
+from magfem.scenario.localization_study.sampling import Sampling, read_frequency, read_sampling
 from magfem.scenario.localization_study.study import Comparison
 from magfem.scenario.plain_values import whole_number
 from magfem.typing import Floats
@@ -32,14 +33,8 @@ class RangeStudy:
     beta: Floats
     draws: int
     frequency: float
-    rate: float
-    duration: float
+    sampling: Sampling
     seed: int
-
-    @property
-    def times(self) -> Floats:
-        """(n,) s."""
-        return np.arange(round(self.duration * self.rate)) / self.rate
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -79,22 +74,22 @@ def read(table: Table) -> RangeStudy:
         raise table.error("beta must be two angles, from and to", "beta")
     if distances.size < 2 or not np.all(np.diff(distances) > 0) or not distances[0] > 0:
         raise table.error("distances must be two or more that increase", "distances")
+    sampling = read_sampling(table)
     return RangeStudy(
         model=table.text("model"),
         noises=quantities(table, "noises", "flux density"),
         distances=distances,
         beta=beta,
         draws=whole_number(table, "draws", 200, 2),
-        frequency=table.quantity("frequency", "frequency"),
-        rate=table.quantity("rate", "frequency"),
-        duration=table.quantity("duration", "time"),
+        frequency=read_frequency(table, sampling),
+        sampling=sampling,
         seed=whole_number(table, "seed", 0, 0),
     )
 
 
 def run(study: RangeStudy) -> RangeErrors:
     """All noises, each at all distances."""
-    rotor = as_rotor(study.model)
+    rotor, times = as_rotor(study.model), study.sampling.times
     found = []
     for number, size in enumerate(study.noises):
         log.info("study: noise up to %.4g nT", size * NANO)
@@ -105,13 +100,25 @@ def run(study: RangeStudy) -> RangeErrors:
         true = drawn_poses(np.broadcast_to(study.distances[:, None], shape), beta, generator)
         # Far beyond the model's region, where what is left of the field is its dipole's.
         clean = simulated_samples(
-            rotor, true.position, true.axis, study.times, study.frequency, phase=true.phase, outside="extrapolate"
+            rotor,
+            true.position,
+            true.axis,
+            study.sampling.times,
+            study.frequency,
+            phase=true.phase,
+            outside="extrapolate",
         )
         sensor = noise.sensor
         pose = localize(
-            noise.added(clean, generator), study.times, rotor, study.frequency, sensor, near=true.position, strict=False
+            noise.added(clean, generator),
+            study.sampling.times,
+            rotor,
+            study.frequency,
+            sensor,
+            near=true.position,
+            strict=False,
         )
-        bound = pose_bound(rotor, true.position, true.axis, sensor, times=study.times, frequency=study.frequency)
+        bound = pose_bound(rotor, true.position, true.axis, sensor, times=times, frequency=study.frequency)
         errors = pose_errors(pose.position, pose.axis, true)
         found.append(
             (

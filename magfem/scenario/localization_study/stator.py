@@ -9,6 +9,7 @@ import numpy as np
 from magfem.geometry.card import Table
 from magfem.localization.stator_influence import StatorInfluence, stator_influence
 from magfem.scenario.localization_study.noise import Noise, read_noise
+from magfem.scenario.localization_study.sampling import Sampling, read_sampling
 from magfem.scenario.localization_study.study import Comparison
 from magfem.scenario.plain_values import whole_number
 from magfem.typing import Floats
@@ -29,8 +30,7 @@ class StatorStudy:
     outer: str
     current: float
     noise: Noise
-    rate: float
-    duration: float
+    sampling: Sampling
     seed: int
 
 
@@ -49,21 +49,21 @@ def read(table: Table) -> StatorStudy:
     table.only(
         *("kind", "study", "name", "source", "model", "inner", "outer", "current", "rate", "duration", "seed", "sensor")
     )
+    sampling = read_sampling(table)
     return StatorStudy(
         model=table.text("model"),
         inner=table.text("inner"),
         outer=table.text("outer"),
         current=table.quantity("current", "current"),
         noise=read_noise(table.table("sensor")),
-        rate=table.quantity("rate", "frequency"),
-        duration=table.quantity("duration", "time"),
+        sampling=sampling,
         seed=whole_number(table, "seed", 0, 0),
     )
 
 
 def run(study: StatorStudy) -> StatorResult:
     """The signal and the influence."""
-    times = np.arange(round(study.duration * study.rate)) / study.rate
+    times = study.sampling.times
     earth = np.array([18e-6, 2e-6, 45e-6])  # T, about that of Twente
     signal = study.noise.added(np.tile(earth, (times.size, 1)), np.random.default_rng(study.seed))
     return StatorResult(

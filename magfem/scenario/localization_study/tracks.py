@@ -16,6 +16,7 @@ from magfem.localization.published import track_as_published
 from magfem.scenario.angles import between
 from magfem.scenario.localization_study.noise import Noise, read_noise
 from magfem.scenario.localization_study.poses import root_mean_square
+from magfem.scenario.localization_study.sampling import Sampling, read_frequency, read_sampling
 from magfem.scenario.localization_study.study import Comparison
 from magfem.scenario.plain_values import whole_number
 from magfem.typing import Floats, Points, Vectors
@@ -31,7 +32,7 @@ WRONG = (0.3, np.radians(45.0))
 class TrackStudy:
     """What is asked.
 
-    spacing: m between the two sensors, along x about the origin.  windows: on each path, of `length` s, one after the
+    spacing: m between the two sensors, along x about the origin.  windows: on each path, of `sampling`, one after the
     other.  random_paths: how many of these.  nearest, farthest: m from the middle of the sensors, of all paths.
     """
 
@@ -39,18 +40,12 @@ class TrackStudy:
     noise: Noise
     spacing: float
     windows: int
-    length: float
     random_paths: int
     nearest: float
     farthest: float
     frequency: float
-    rate: float
+    sampling: Sampling
     seed: int
-
-    @property
-    def times(self) -> Floats:
-        """(n,) s within a window."""
-        return np.arange(round(self.length * self.rate)) / self.rate
 
     @property
     def sensors(self) -> tuple[Sensor, Sensor]:
@@ -116,17 +111,17 @@ def read(table: Table) -> TrackStudy:
     nearest, farthest = table.quantity("nearest", "length"), table.quantity("farthest", "length")
     if not 5e-3 < nearest < farthest < np.inf:
         raise table.error("farthest must be beyond nearest, and nearest beyond 5 mm", "farthest")
+    sampling = read_sampling(table, "window")
     return TrackStudy(
         model=table.text("model"),
         noise=read_noise(table.table("sensor")),
         spacing=table.quantity("spacing", "length"),
         windows=whole_number(table, "windows", 100, 8),
-        length=table.quantity("window", "time"),
         random_paths=whole_number(table, "random_paths", 2, 0),
         nearest=nearest,
         farthest=farthest,
-        frequency=table.quantity("frequency", "frequency"),
-        rate=table.quantity("rate", "frequency"),
+        frequency=read_frequency(table, sampling),
+        sampling=sampling,
         seed=whole_number(table, "seed", 0, 0),
     )
 
@@ -153,12 +148,12 @@ def _followed(study: TrackStudy, name: str, position: Points, axis: Vectors, see
     generator = np.random.default_rng(seed)
     phase = generator.uniform(-np.pi, np.pi, len(position))
     quiet = [one.pose for one in sensors]  # the noise is added below
-    clean = simulated_samples(rotor, position, axis, study.times, study.frequency, quiet, phase=phase)
+    clean = simulated_samples(rotor, position, axis, study.sampling.times, study.frequency, quiet, phase=phase)
     samples = study.noise.added(clean, generator)
-    starts = study.length * np.arange(len(position))
-    found = track(samples, study.times, rotor, study.frequency, sensors, starts=starts, strict=False)
+    starts = study.sampling.duration * np.arange(len(position))
+    found = track(samples, study.sampling.times, rotor, study.frequency, sensors, starts=starts, strict=False)
     centre = sensors[0].pose.translation
-    old = track_as_published(samples[:, 0], study.times, isoline_functions(study.model), position[0] - centre)
+    old = track_as_published(samples[:, 0], study.sampling.times, isoline_functions(study.model), position[0] - centre)
     return PathResult(
         name=name,
         position=position,

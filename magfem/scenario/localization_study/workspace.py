@@ -10,6 +10,7 @@ from scipy.spatial.transform import RigidTransform
 from magfem.geometry.card import Table
 from magfem.localization import Sensor, Workspace, as_rotor, place_sensors, workspace
 from magfem.scenario.localization_study.noise import Noise, quantities, read_noise
+from magfem.scenario.localization_study.sampling import Sampling, read_frequency, read_sampling
 from magfem.scenario.localization_study.study import Comparison
 from magfem.scenario.plain_values import whole_number
 from magfem.typing import Floats
@@ -38,14 +39,8 @@ class WorkspaceStudy:
     placed: int
     plate: float
     frequency: float
-    rate: float
-    duration: float
+    sampling: Sampling
     seed: int
-
-    @property
-    def times(self) -> Floats:
-        """(n,) s."""
-        return np.arange(round(self.duration * self.rate)) / self.rate
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -67,6 +62,7 @@ def read(table: Table) -> WorkspaceStudy:
         *("kind", "study", "name", "source", "model", "spacings", "width", "depth", "points", "position", "axis"),
         *("placed", "plate", "frequency", "rate", "duration", "seed", "sensor"),
     )
+    sampling = read_sampling(table)
     return WorkspaceStudy(
         model=table.text("model"),
         noise=read_noise(table.table("sensor")),
@@ -78,9 +74,8 @@ def read(table: Table) -> WorkspaceStudy:
         axis=table.quantity("axis", "angle"),
         placed=whole_number(table, "placed", 3, 1, 64),
         plate=table.quantity("plate", "length"),
-        frequency=table.quantity("frequency", "frequency"),
-        rate=table.quantity("rate", "frequency"),
-        duration=table.quantity("duration", "time"),
+        frequency=read_frequency(table, sampling),
+        sampling=sampling,
         seed=whole_number(table, "seed", 0, 0),
     )
 
@@ -92,7 +87,7 @@ def run(study: WorkspaceStudy) -> WorkspaceMaps:
     z = np.linspace(_LEAST_DISTANCE, study.depth, max(5, round(study.points * study.depth / study.width)))
     points = np.stack([*np.meshgrid(x, [0.0], z, indexing="ij")], axis=-1)[:, 0]
     maps = [
-        workspace(rotor, points, _line(study, spacing), times=study.times, frequency=study.frequency)
+        workspace(rotor, points, _line(study, spacing), times=study.sampling.times, frequency=study.frequency)
         for spacing in study.spacings
     ]
     near = np.random.default_rng(study.seed).uniform(
@@ -109,7 +104,7 @@ def run(study: WorkspaceStudy) -> WorkspaceMaps:
         [-half, -half, 0.0],
         [half, half, 0.0],
         noise=deviation,
-        times=study.times,
+        times=study.sampling.times,
         frequency=study.frequency,
         seed=study.seed,
     )
@@ -117,7 +112,7 @@ def run(study: WorkspaceStudy) -> WorkspaceMaps:
         Sensor(pose=RigidTransform.from_translation([at, 0.0, 0.0]), noise=deviation)
         for at in np.linspace(-half, half, study.placed)
     ]
-    beside = workspace(rotor, near, line, times=study.times, frequency=study.frequency)
+    beside = workspace(rotor, near, line, times=study.sampling.times, frequency=study.frequency)
     return WorkspaceMaps(
         study=study,
         x=x,
