@@ -190,7 +190,8 @@ def _path(found: Tracks, one: PathResult) -> Picture:
         f"The {one.name} path as localized by three methods, and their errors along it.",
         f"The {one.name} path (broad grey) in {len(one.position)} windows of "
         f"{found.study.sampling.duration:g} s, the axis as arrows, the sensors as squares, and errors "
-        "along it (Fig. 6.7). Dashed: the limits of 1 mm and 3°, for root mean squares. The published algorithm begins at the true place and hands its faults on.",
+        "along it (Fig. 6.7). Dashed: the limits of 1 mm and 3°, for root mean squares. The published "
+        "algorithm begins at the true place and hands its faults on.",
     )
 
 
