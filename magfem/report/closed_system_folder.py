@@ -7,7 +7,6 @@ import io
 import logging
 import struct
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -23,11 +22,6 @@ FILES = frozenset(
     ["summary.json", "timeseries.csv", "recipe.toml", "way.png", "errors.png", "animation.gif", "report.html"]
 )
 """All that the folder may hold."""
-
-
-@dataclass(frozen=True)
-class _Titled:
-    title: str
 
 
 def write_closed_run(run: ClosedRun, folder: Path, pictures: bool = True) -> None:
@@ -91,7 +85,7 @@ def render(run: ClosedRun, drawn: Sequence[Picture], moving: bytes) -> str:
         environment()
         .get_template("closed_system_page.html.j2")
         .render(
-            subject=_Titled(run.system.name),
+            title=run.system.name,
             data=data,
             reached=sum(one["reached"] for one in data["targets"]),
             pictures={picture.name: (picture,) for picture in drawn},

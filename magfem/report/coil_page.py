@@ -85,6 +85,7 @@ def context(subject: CoilSubject, place: Workplace) -> dict[str, Any]:
     rows = [_row(solution, circuit, place) for circuit in solution.circuits[: _told(solution)]]
     limit = geometry.conductor.current_density_limit
     return {
+        "title": subject.title,
         "subject": subject,
         "solution": solution,
         "place": place,

@@ -55,6 +55,7 @@ def context(subject: Subject) -> dict[str, Any]:
     per_ampere = "/A" if model.unit == "T/A" else ""
     report = {**_MAYBE, **model.report}
     return {
+        "title": subject.title,
         "subject": subject,
         "model": model,
         "report": report,

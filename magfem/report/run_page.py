@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import struct
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from magfem.report.environment import environment
 from magfem.report.figures.style import Picture
@@ -18,18 +17,13 @@ from magfem.version import __version__
 TEMPLATE = "run_page.html.j2"
 
 
-@dataclass(frozen=True)
-class _Titled:
-    title: str
-
-
 def render(run: Run, pictures: Sequence[Picture], moving: bytes) -> str:
     """The whole page as HTML; nothing in it is loaded from outside. moving: a GIF."""
     data = summary(run)
     reached = [max(one["error_deg"]) for one in data["targets"] if one["outcome"] == "converged"]
     template = environment({"degrees": _degrees}).get_template(TEMPLATE)
     return template.render(
-        subject=_Titled(run.scenario.name),
+        title=run.scenario.name,
         data=data,
         worst=float(max(reached)) if reached else None,
         pictures={picture.name: (picture,) for picture in pictures},

@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import logging
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -26,11 +25,6 @@ _PICTURES = (
 )
 FILES = frozenset(["summary.json", "data.npz", "recipe.toml", "report.html"] + [f"{name}.png" for name in _PICTURES])
 """All that the folder may hold."""
-
-
-@dataclass(frozen=True)
-class _Titled:
-    title: str
 
 
 def write_study(study: Study, folder: Path, pictures: bool = True) -> None:
@@ -68,7 +62,7 @@ def render(study: Study, drawn: Sequence[Picture]) -> str:
         environment()
         .get_template("study_page.html.j2")
         .render(
-            subject=_Titled(study.name),
+            title=study.name,
             study=study,
             kept=sum(one.holds for one in limited),
             limits=len(limited),
