@@ -5,12 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import chi2
 
 from magfem.localization.frequency import Frequency
 from magfem.localization.orientation import orientation
 from magfem.localization.real_numbers import real_numbers
 from magfem.localization.signal import RotatingField
 from magfem.typing import ArrayLike, Booleans, Floats, Integers, Points, Vectors
+
+BY_CHANCE = 1e-6
+"""Probability of a misfit by noise alone below which it is told."""
+
+SCATTERED = 1.5
+"""Of its stated noise: samples that scatter less than so much more are not worth a warning."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +81,24 @@ class Pose(Branch):
         return np.asarray(np.linalg.norm(self.position, axis=-1))
 
     @property
+    def scattered(self) -> Booleans:
+        """(...) whether the samples of a sensor scatter more about an even rotation than its stated noise says."""
+        told = [np.zeros(np.shape(self.residual), dtype=bool)]
+        for one in self.fields:
+            freedom = np.maximum(one.count - 3, 0).sum(axis=-1)
+            square = np.sum(np.maximum(one.count - 3, 0) * (one.residual / one.noise) ** 2, axis=-1)
+            told.append(square > np.maximum(SCATTERED**2 * freedom, chi2.isf(BY_CHANCE, np.maximum(freedom, 1))))
+        return np.asarray(np.any(told, axis=0))
+
+    @property
+    def contradicted(self) -> Booleans:
+        """(...) whether sensors see what no pose explains. One alone, six numbers for six unknowns, cannot."""
+        count = 6 * len(self.fields)
+        if count == 6:
+            return np.zeros(np.shape(self.residual), dtype=bool)
+        return np.asarray(count * self.residual**2 > chi2.isf(BY_CHANCE, count - 6))
+
+    @property
     def warnings(self) -> tuple[str, ...]:
         """What to beware of, in words; empty when all is well."""
         of = f" of {self.singular.size} poses" if self.singular.size > 1 else ""
@@ -83,6 +108,15 @@ class Pose(Branch):
             (
                 self.singular,
                 "the sensor is near the rotation plane or near the axis, where one sensor is blind to beta",
+            ),
+            (
+                self.scattered,
+                "the samples scatter more than their noise: another magnet, an uneven rotation or a full sensor is not "
+                "in the covariance",
+            ),
+            (
+                self.contradicted,
+                "the sensors contradict each other: look at their poses, gains and noise, and at the magnet's model",
             ),
             (self.ambiguous, "another branch is as likely: state where the rotor is about, or use a second sensor"),
         )

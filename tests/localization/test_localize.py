@@ -313,3 +313,25 @@ def test_errors_for_people(change: dict[str, object], words: str) -> None:
 def test_sensors_that_cannot_be(change: dict[str, object], words: str) -> None:
     with pytest.raises(InputError, match=words):
         Sensor(**change)  # type: ignore[arg-type]
+
+
+def test_samples_that_their_noise_does_not_explain_are_told() -> None:
+    """Clipped ones whose limit nobody stated, and sensors of a card that says them to be elsewhere; noise alone never:
+    one false alarm in a million is stated.
+    """
+    quiet = Sensor(noise=1e-7)
+    seen = dipole_samples(POSITION, AXIS, TIMES) + 1e-7 * np.random.default_rng(1).normal(size=(60, 3))
+    clean = localize(seen, TIMES, DIPOLE, 1.0, quiet, near=POSITION)
+    assert not clean.warnings and not clean.scattered and not clean.contradicted
+    clipped = localize(np.clip(seen, -6e-6, 6e-6), TIMES, DIPOLE, 1.0, quiet, near=POSITION)
+    assert clipped.scattered and any("scatter more than their noise" in words for words in clipped.warnings)
+
+    stated = [Sensor(noise=3e-6, pose=RigidTransform.from_translation([x, 0.0, 0.0])) for x in (-0.01, 0.01)]
+    truly = [dipole_samples(POSITION, AXIS, TIMES, sensor=np.array([x, 0.0, 0.0])) for x in (-0.01, 0.015)]
+    noise = 3e-6 * np.random.default_rng(2).normal(size=(2000, 2, 60, 3))
+    moved = localize(np.array(truly) + noise[0], TIMES, DIPOLE, 1.0, stated)
+    assert moved.contradicted and any("contradict" in words for words in moved.warnings)
+    right = [dipole_samples(POSITION, AXIS, TIMES, sensor=one.pose.translation) for one in stated]
+    many = localize(np.array(right) + noise, TIMES, DIPOLE, 1.0, stated, strict=False)
+    assert many.scattered.shape == many.contradicted.shape == (2000,)
+    assert not many.scattered.any() and not many.contradicted.any()
