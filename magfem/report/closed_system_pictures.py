@@ -28,7 +28,7 @@ from magfem.report.figures.style import (
     grid,
     png,
 )
-from magfem.scenario.closed_system.run import LOCALIZING, MANIPULATING, MOVING, SWITCHING, ClosedRun
+from magfem.scenario.closed_system.record import LOCALIZING, MANIPULATING, MOVING, SWITCHING, ClosedRun
 from magfem.typing import Floats
 
 MILLI = 1e3

@@ -17,7 +17,7 @@ from magfem.localization.sensor import as_sensors
 from magfem.scenario.closed_system import ClosedRun, read_closed_system, simulate_closed_system
 from magfem.scenario.closed_system.motor import Play, TrueMotor, turning_field
 from magfem.scenario.closed_system.network import Network, side_of
-from magfem.scenario.closed_system.run import LOCALIZING, MANIPULATING, SWITCHING
+from magfem.scenario.closed_system.record import LOCALIZING, MANIPULATING, SWITCHING
 from magfem.scenario.closed_system.steering import Tip, tether_turn, turned, wanted_moment
 
 REPORTS = Path(__file__).parents[2] / "reports"

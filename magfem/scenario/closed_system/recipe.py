@@ -73,8 +73,8 @@ from magfem.geometry.card import Table, read_table
 from magfem.geometry.catalogue import resolve, short_path
 from magfem.localization import Sensor, as_rotor
 from magfem.scenario.closed_system.network import Network
-from magfem.scenario.closed_system.run import ClosedSystem, check_targets
 from magfem.scenario.closed_system.steering import Coil, Tip
+from magfem.scenario.closed_system.system import ClosedSystem, check_targets
 from magfem.scenario.plain_values import whole_number
 from magfem.typing import Floats
 from magfem.units import describe, quantity

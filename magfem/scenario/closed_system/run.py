@@ -1,224 +1,41 @@
-"""The run: localize, move the arm, push on; lock, bend and push at every branch; and what came of it."""
+"""The run: localize, move the arm, push on; lock, bend and push at every branch."""
 
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from datetime import UTC, datetime
-from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
-from magfem.errors import InputError
 from magfem.fitting import load_model
-from magfem.localization import Branch, Pose, Rotor, Sensor, as_rotor, localize
+from magfem.localization import Branch, Pose, Rotor, as_rotor, localize
 from magfem.localization.orientation import orientation
 from magfem.localization.sensor import SensorArray, as_sensors
 from magfem.localization.stator_influence import Stator
 from magfem.scenario.angles import between
-from magfem.scenario.closed_system.motor import Play, TrueMotor, read_by, turning_field
+from magfem.scenario.closed_system.motor import Play, read_by, turning_field
 from magfem.scenario.closed_system.network import Network, Way, angle_to, side_of
-from magfem.scenario.closed_system.steering import Coil, Tip, tether_turn, turned, wanted_moment
-from magfem.typing import Floats, Points, Vectors
+from magfem.scenario.closed_system.record import (
+    LOCALIZING,
+    MANIPULATING,
+    MOVING,
+    SWITCHING,
+    Bending,
+    ClosedRun,
+    Localization,
+    Mode,
+)
+from magfem.scenario.closed_system.steering import tether_turn, turned, wanted_moment
+from magfem.scenario.closed_system.system import ClosedSystem
+from magfem.typing import Points, Vectors
 from magfem.version import __version__
 
 log = logging.getLogger("magfem")
 
-LOCALIZING, MOVING, MANIPULATING, SWITCHING = "localizing", "moving", "manipulating", "switching"
-FORMAT, VERSION = "magfem closed system", 1
 FAULTY = 15e-3  # m between a pose and where the motor is expected, beyond which the pose is not followed
 _MOST_LOCALIZATIONS = 2000
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class ClosedSystem:
-    """Everything that the closed system is made of; see `recipe`.
-
-    tool_height: m above the network's plane.  sensors: on the tool, in its frame, whose axes are the base's.
-    behind: m, how far behind the motor, along its axis, the tool is held to localize: right above it one sensor sees β
-    = 0.  arm_error: m, standard deviation of where the tool truly is.  step: m pushed between localizations.  speeds in
-    m/s, times in s.  margin: m before a junction at which the tip is bent.  clear: m that a junction is left behind by.
-    divider: m, half the width of the wall between two branches.
-    """
-
-    name: str
-    source: str
-    text: str
-    network: Network
-    targets: tuple[str, ...]
-    rotor: str
-    inner: str
-    outer: str
-    stator_current: float
-    frequency: float
-    rate: float
-    window: float
-    motor_diameter: float
-    tip: Tip
-    coil: Coil
-    sensors: tuple[Sensor, ...]
-    static: Vectors
-    tool_height: float
-    behind: float
-    arm_error: float
-    arm_speed: float
-    push_speed: float
-    step: float
-    margin: float
-    clear: float
-    divider: float
-    heating: float
-    cooling: float
-    turning: float
-    attempts: int
-    seed: int
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Localization:
-    """One localization: when, what is true, what is found, and what is found without the stator's field."""
-
-    time: float
-    true: TrueMotor
-    position: Points
-    axis: Vectors
-    position_deviation: float
-    axis_deviation: float
-    without_stator: tuple[Points, Vectors]
-    tool: Points
-    target: str
-
-    @property
-    def position_error(self) -> float:
-        """m."""
-        return float(np.linalg.norm(self.position - self.true.position))
-
-    @property
-    def axis_error(self) -> float:
-        """rad."""
-        return float(between(self.axis, self.true.axis))
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Bending:
-    """One manipulation before a junction.
-
-    side: +1 to the left.  deflection: m of the tip to the left.  lateral: m that the motor lies to the left of the
-    centre line.  entered: the branch.  field: T at the motor.  turn: rad that the tether was turned.  moment_error:
-    rad, between the wanted moment and the true one.  at_sensors: T, the largest field of the coil at a sensor.
-    """
-
-    time: float
-    node: str
-    wanted: str
-    entered: str
-    side: float
-    deflection: float
-    lateral: float
-    field: Vectors
-    turn: float
-    moment_error: float
-    at_sensors: float
-    tool: Points
-    position: Points
-    tip: Points
-
-    @property
-    def alone(self) -> float:
-        """m to the wanted side without any field: positive would have entered by chance."""
-        return self.side * self.lateral
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Mode:
-    """A stretch of time, s."""
-
-    name: str
-    start: float
-    end: float
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class ClosedRun:
-    """What came of it. reached: by target.  distance: m pushed and pulled."""
-
-    system: ClosedSystem
-    localizations: tuple[Localization, ...]
-    bendings: tuple[Bending, ...]
-    modes: tuple[Mode, ...]
-    reached: Mapping[str, bool]
-    distance: float
-    provenance: dict[str, Any] = field(default_factory=dict)
-
-    @property
-    def passed(self) -> bool:
-        """Whether every target was reached."""
-        return all(self.reached.values())
-
-    @property
-    def duration(self) -> float:
-        """s."""
-        return self.modes[-1].end if self.modes else 0.0
-
-    def share(self, name: str) -> float:
-        """Of the time that a mode takes."""
-        return sum(one.end - one.start for one in self.modes if one.name == name) / max(self.duration, 1e-12)
-
-    def summary(self) -> dict[str, Any]:
-        """What `summary.json` holds; mm, deg, s, mT."""
-        off = np.array([one.position_error for one in self.localizations])
-        turned_by = np.array([one.axis_error for one in self.localizations])
-        shift = np.array([np.linalg.norm(one.position - one.without_stator[0]) for one in self.localizations])
-        swing = np.array([between(one.axis, one.without_stator[1]) for one in self.localizations])
-        full = max((one.at_sensors for one in self.bendings), default=0.0)
-        limit = min(one.saturation for one in self.system.sensors)
-        return {
-            "format": FORMAT,
-            "version": VERSION,
-            "name": self.system.name,
-            "source": self.system.source,
-            "passed": self.passed,
-            "targets": [{"node": name, "reached": done} for name, done in self.reached.items()],
-            "junctions": [
-                {
-                    "time_s": one.time,
-                    "node": one.node,
-                    "wanted": one.wanted,
-                    "entered": one.entered,
-                    "as_wanted": one.entered == one.wanted,
-                    "deflection_mm": 1e3 * one.side * one.deflection,
-                    "without_field_mm": 1e3 * one.alone,
-                    "field_mT": 1e3 * float(np.linalg.norm(one.field)),
-                    "tether_turn_deg": np.degrees(one.turn),
-                    "moment_error_deg": np.degrees(one.moment_error),
-                }
-                for one in self.bendings
-            ],
-            "localization": {
-                "count": len(self.localizations),
-                "position_error_mm": {"rms": 1e3 * _rms(off), "worst": 1e3 * float(off.max())},
-                "axis_error_deg": {"rms": np.degrees(_rms(turned_by)), "worst": np.degrees(float(turned_by.max()))},
-                "stated_position_mm": 1e3 * _rms(np.array([one.position_deviation for one in self.localizations])),
-                "stated_axis_deg": np.degrees(_rms(np.array([one.axis_deviation for one in self.localizations]))),
-                "rate_Hz": len(self.localizations) / self.duration,
-            },
-            "stator": {
-                "largest_shift_mm": 1e3 * float(shift.max()),
-                "largest_turn_deg": np.degrees(float(swing.max())),
-            },
-            "coil_at_sensors": {
-                "largest_mT": 1e3 * full,
-                "saturation_mT": None if np.isinf(limit) else 1e3 * limit,
-                "saturates": bool(full >= limit),
-            },
-            "distance_mm": 1e3 * self.distance,
-            "duration_s": self.duration,
-            "share_of_time": {name: self.share(name) for name in (LOCALIZING, MOVING, MANIPULATING, SWITCHING)},
-            "published": {"distance_mm": 400.0, "duration_s": 300.0, "localization_rate_Hz": 0.3},
-            "provenance": self.provenance,
-        }
 
 
 def simulate_closed_system(system: ClosedSystem) -> ClosedRun:
@@ -483,20 +300,3 @@ def _leaf(network: Network, node: str) -> str:
     """A node without children, beyond `node`."""
     children = network.children(node)
     return _leaf(network, children[0]) if children else node
-
-
-def _rms(values: Floats) -> float:
-    return float(np.sqrt(np.mean(values**2)))
-
-
-def check_targets(network: Network, targets: tuple[str, ...]) -> None:
-    """Raise InputError unless every target is an end of the network and all branches on the way lie to one side."""
-    for target in targets:
-        names = network.names_to(target)
-        if network.children(target):
-            raise InputError(f"target {target!r} is a junction: targets are ends of the network")
-        for before, node, after in zip(names, names[1:], names[2:], strict=False):
-            here = np.append(network.nodes[node] - network.nodes[before], 0.0)
-            ahead = {name: np.append(network.nodes[name] - network.nodes[node], 0.0) for name in network.children(node)}
-            if len(ahead) > 1:
-                side_of(here, ahead[after], [one for name, one in ahead.items() if name != after])
