@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from magfem.cli.localize import stated_rate, stated_setup, stated_windows
 from magfem.cli.located import Located
-from magfem.cli.pose_text import pose_line
+from magfem.cli.pose_text import pose_line, time_text
 from magfem.errors import InputError
 from magfem.units import one_line
 
@@ -117,7 +117,7 @@ class _Live:
                 self._print(json.dumps(entry, allow_nan=False), pose_line(entry))
             for one in self.located.left_out[missed:]:
                 self.reason = one["reason"]
-                _complain(f"no pose at t = {one['time']:.6g} s: {self.reason}")
+                _complain(f"no pose at t = {time_text(one['time'])} s: {self.reason}")
             if not self.keep:  # it may run for days
                 self.located.entries.clear()
                 self.located.left_out.clear()

@@ -21,13 +21,19 @@ def pose_line(entry: dict[str, Any]) -> str:
     x, y, z = (f"{1e3 * value:.2f}" for value in entry["position"])
     axis = ", ".join(f"{value:.3f}" for value in entry["axis"])
     text = (
-        f"t = {entry['time']:.6g} s: position ({x}, {y}, {z}) mm ± {_millimetres(entry['position_deviation'])} mm, "
+        f"t = {time_text(entry['time'])} s: "
+        f"position ({x}, {y}, {z}) mm ± {_millimetres(entry['position_deviation'])} mm, "
         f"axis ({axis}) ± {_degrees(entry['axis_deviation'])} deg, {entry['frequency']:.6g} Hz"
     )
     if entry.get("faulty"):
         text += ", does not fit the windows before"
     branches = len(entry["branches"])
     return f"{text}, one of {branches} branches" if entry["ambiguous"] and branches > 1 else text
+
+
+def time_text(time: float) -> str:
+    """s, to a millisecond at least: clocks may count from 1970."""
+    return f"{time:.9g}" if abs(time) < 1e5 else f"{time:.3f}"
 
 
 def poses_text(data: dict[str, Any], setup: Setup, recording: Recording, files: Sequence[str]) -> str:
@@ -57,7 +63,7 @@ def poses_text(data: dict[str, Any], setup: Setup, recording: Recording, files: 
             branches.append((str(number), *_position_cells(one), _axis_cell(one), _phase_cell(one), less))
         text += f"\n\n{table(branches)}"
     notes = [f"{words}{_count(entries, words)}" for words in dict.fromkeys(w for e in entries for w in e["warnings"])]
-    notes += [f"no pose at t = {one['time']:.6g} s: {one['reason']}" for one in data["left_out"]]
+    notes += [f"no pose at t = {time_text(one['time'])} s: {one['reason']}" for one in data["left_out"]]
     if files:
         notes.append(f"all of it in {' and '.join(files)}")
     return text + "".join(f"\n  {note}" for note in notes)
@@ -66,7 +72,7 @@ def poses_text(data: dict[str, Any], setup: Setup, recording: Recording, files: 
 def _row(entry: dict[str, Any]) -> tuple[str, ...]:
     snr = entry["signal_to_noise"]
     return (
-        f"{entry['time']:.6g} s",
+        f"{time_text(entry['time'])} s",
         f"{entry['frequency']:.6g} Hz",
         *_position_cells(entry),
         _millimetres(entry["position_deviation"]),

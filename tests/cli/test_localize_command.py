@@ -194,6 +194,14 @@ def test_several_motors_have_a_pose_each(here: Path, capsys: pytest.CaptureFixtu
         assert pose["phase"] == pytest.approx(true.phase, abs=1e-5)
 
 
+def test_times_since_1970_keep_their_milliseconds(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    true = Turning([0.02, 0.005, 0.03], [0.3, -0.2, 1.0])
+    t = np.arange(40) / 20.0
+    write_samples(Path("s.csv"), t + 1732561234.5, true.field([0, 0, 0], t))
+    assert main([*FILE, "--near", "20 5 30 mm", "--frequency", "0.5"]) == 0
+    assert "1732561235.475 s" in capsys.readouterr().out
+
+
 def test_a_track_is_nearer_than_its_windows(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A magnet on an arc at 30 mm, 3 µT of noise: the smoothed windows are nearer to it than each alone, their
     deviations tell how near, and a gap leaves windows out without losing the way.
