@@ -38,6 +38,7 @@ AXES = (BLUE, ORANGE, GREEN)
 _WIDE = 7.4  # inches
 _TURNS = 8  # of the slowest motor that the signal shows at most
 _SHOWN = 3000  # samples of a curve that still are single dots
+_LONG_AGO = 1e5  # s after the zero of the clock: beyond, times are shown from a whole second on
 
 
 def localization_picture(
@@ -84,15 +85,16 @@ def _signal(panels: Sequence[Axes], last: Recording, poses: Sequence[Pose], plac
     dense = np.linspace(begin, end, 1200)
     fitted = fields[0].static + sum(_turning(field, dense) for field in fields)
     seen = (last.times >= begin) & (last.times <= end)
+    zero = np.floor(begin) if abs(begin) > _LONG_AGO else 0.0
     style = {"marker": ".", "markersize": 3.0, "linestyle": "none"} if seen.sum() < _SHOWN else {"linewidth": 0.4}
     for axis, (panel, colour) in enumerate(zip(panels, AXES, strict=True)):
-        panel.plot(last.times[seen], MICRO * last.B[seen, axis], color=GREY, **style)
-        panel.plot(dense, MICRO * fitted[:, axis], color=colour, linewidth=1.3)
+        panel.plot(last.times[seen] - zero, MICRO * last.B[seen, axis], color=GREY, **style)
+        panel.plot(dense - zero, MICRO * fitted[:, axis], color=colour, linewidth=1.3)
         panel.set_ylabel(f"b{'xyz'[axis]} (µT)")
         grid(panel)
         panel.sharex(panels[0])
         panel.tick_params(labelbottom=axis == 2)
-    panels[-1].set_xlabel("time (s)")
+    panels[-1].set_xlabel(f"time after {zero:.0f} s (s)" if zero else "time (s)")
 
 
 def _turning(field: RotatingField, times: Floats) -> Floats:
