@@ -6,8 +6,8 @@ samples allow is where Gauss–Newton begins, and the track is the one that expl
 smoothly as its process noise says. That is found from the samples as well, as what makes them most likely. Windows
 that do not fit the track even so are told from it, and weigh less.
 
-The magnet is taken to stand still during a window. One sensor alone cannot tell a track from its mirror image: then
-`Track.ambiguous` says so, and `near` chooses.
+The magnet is taken to stand still during a window, where it is in its middle. One sensor alone cannot tell a track from
+its mirror image: then `Track.ambiguous` says so, and `near` chooses.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform
@@ -138,22 +138,33 @@ def run(study: TrackStudy) -> Tracks:
     found = []
     for number, (name, path) in enumerate(paths):
         log.info("study: %s path", name)
-        position, axis = path(study)
-        found.append(_followed(study, name, position, axis, study.seed + number))
+        every = replace(study, windows=study.windows * study.sampling.times.size)  # a pose for every sample
+        found.append(_followed(study, name, *path(every), study.seed + number))
     return Tracks(study=study, paths=tuple(found))
 
 
-def _followed(study: TrackStudy, name: str, position: Points, axis: Vectors, seed: int) -> PathResult:
-    rotor, sensors = as_rotor(study.model), study.sensors
+def _followed(study: TrackStudy, name: str, places: Points, axes: Vectors, seed: int) -> PathResult:
+    """What is found of a magnet that goes on moving while samples are taken, at places and about axes (w · n, 3)."""
+    rotor, sensors, times = as_rotor(study.model), study.sensors, study.sampling.times
     generator = np.random.default_rng(seed)
-    phase = generator.uniform(-np.pi, np.pi, len(position))
+    phase = generator.uniform(-np.pi, np.pi, study.windows)
+    places, axes = (one.reshape(study.windows, times.size, 3) for one in (places, axes))
     quiet = [one.pose for one in sensors]  # the noise is added below
-    clean = simulated_samples(rotor, position, axis, study.sampling.times, study.frequency, quiet, phase=phase)
+    clean = np.concatenate(
+        [
+            simulated_samples(rotor, places[:, k], axes[:, k], times[k : k + 1], study.frequency, quiet, phase=phase)
+            for k in range(times.size)
+        ],
+        axis=-2,
+    )
+    # What is true of a window is where the magnet is in its middle.
+    before, after = (times.size - 1) // 2, times.size // 2
+    position, axis = 0.5 * (places[:, before] + places[:, after]), _unit(axes[:, before] + axes[:, after])
     samples = study.noise.added(clean, generator)
     starts = study.sampling.duration * np.arange(len(position))
-    found = track(samples, study.sampling.times, rotor, study.frequency, sensors, starts=starts, strict=False)
+    found = track(samples, times, rotor, study.frequency, sensors, starts=starts, strict=False)
     centre = sensors[0].pose.translation
-    old = track_as_published(samples[:, 0], study.sampling.times, isoline_functions(study.model), position[0] - centre)
+    old = track_as_published(samples[:, 0], times, isoline_functions(study.model), position[0] - centre)
     return PathResult(
         name=name,
         position=position,
