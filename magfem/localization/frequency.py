@@ -135,8 +135,7 @@ def find_frequency(
     unit = np.array([span, span**2, 1.0, 1.0])[chosen]  # what the unknowns are large by: turns over the record, rad
     theta = np.concatenate([f[..., None], d[..., None], np.zeros((*lead, 2))], axis=-1)
     for _ in range(_MOST_STEPS):
-        information, gradient, misfit = _linearised(b, tau, used, theta, weights)
-        information, gradient = information[..., chosen, :][..., chosen], gradient[..., chosen]
+        information, gradient, misfit = _linearised(b, tau, used, theta, weights, chosen)
         scaled = information / (unit[:, None] * unit)
         if not np.all(np.linalg.det(scaled) > 0):
             raise _lost()
@@ -260,29 +259,30 @@ def _power(b: Floats, used: Booleans, waves: Complexes, chirp: Complexes | None 
     return power
 
 
-def _linearised(b: Floats, tau: Floats, used: Booleans, theta: Floats, weight: Floats) -> tuple[Floats, Floats, Floats]:
-    """Information (..., 4, 4) and gradient (..., 4) of frequency, drift and both parts of the swing, `theta` (..., 4),
-    and the weighted misfit (...), all amplitudes eliminated.
+def _linearised(
+    b: Floats, tau: Floats, used: Booleans, theta: Floats, weight: Floats, chosen: list[int]
+) -> tuple[Floats, Floats, Floats]:
+    """Information (..., k, k) and gradient (..., k) of the `chosen` of frequency, drift and both parts of the swing,
+    `theta` (..., 4), and the weighted misfit (...), all amplitudes eliminated.
     """
     f, d, s_c, s_s = (theta[..., k, None] for k in range(4))
     even = 2 * np.pi * (f * tau + 0.5 * d * tau**2)
     cos2, sin2 = np.cos(2 * even), np.sin(2 * even)
     angle = even + s_c * cos2 + s_s * sin2
     cos, sin = np.cos(angle), np.sin(angle)
-    X = (
-        np.stack([np.ones_like(cos), cos, sin], axis=-1)[..., None, :, :] * np.swapaxes(used, -1, -2)[..., None]
-    )  # (..., c, n, 3)
+    here = np.swapaxes(used, -1, -2)[..., None]  # (..., c, n, 1)
+    X = np.stack([np.ones_like(cos), cos, sin], axis=-1)[..., None, :, :] * here  # (..., c, n, 3)
     y = np.swapaxes(b, -1, -2)[..., None]  # (..., c, n, 1); zero where not used
     Xt = np.swapaxes(X, -1, -2)
     normal = np.linalg.inv(Xt @ X)
     c = normal @ (Xt @ y)  # (..., c, 3, 1)
-    left = (y - X @ c)[..., 0]
     speed = -c[..., 1, :] * sin[..., None, :] + c[..., 2, :] * cos[..., None, :]  # (..., c, n) per rad
     pace = 2 * np.pi * (1 - 2 * s_c * sin2 + 2 * s_s * cos2)  # of the angle, per turn of the even rotation
-    by = np.stack([pace * tau, 0.5 * pace * tau**2, cos2, sin2], axis=-1)  # (..., n, 4)
-    D = speed[..., None] * by[..., None, :, :] * np.swapaxes(used, -1, -2)[..., None]
-    D = D - X @ (normal @ (Xt @ D))
-    information = np.einsum("...ank,...anl,a->...kl", D, D, weight)
-    gradient = np.einsum("...ank,...an,a->...k", D, left, weight)
-    misfit = np.einsum("...an,a->...", left**2, weight)
-    return information, gradient, misfit
+    every = (pace * tau, 0.5 * pace * tau**2, cos2, sin2)
+    by = np.stack([every[k] for k in chosen], axis=-1)  # (..., n, k)
+    D = speed[..., None] * by[..., None, :, :] * here
+    # What changes and what is left, side by side, weighted, all columns of samples in one: (..., c · n, k + 1).
+    both = np.concatenate([D - X @ (normal @ (Xt @ D)), y - X @ c], axis=-1) * np.sqrt(weight)[:, None, None]
+    both = both.reshape(*both.shape[:-3], -1, both.shape[-1])
+    product = np.swapaxes(both, -1, -2) @ both
+    return product[..., :-1, :-1], product[..., :-1, -1], product[..., -1, -1]
