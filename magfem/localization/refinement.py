@@ -89,6 +89,7 @@ def refine(
     # Below, arrays are of the candidates under way: `going` are their numbers.
     going = np.arange(count)
     now = _Candidates(p, R, *linearised(rotor, array, p, R, target, weight))
+    J = np.empty_like(now.J)
     distance = _distance(p, array)
     size = np.concatenate([np.repeat(distance[:, None], 3, axis=1), np.ones((count, 3))], axis=1)  # of what is a step
     closest = CLOSEST * distance
@@ -114,7 +115,8 @@ def refine(
         damping, growth = _next_damping(damping, growth, better, gain, step, normal, gradient)
         done = small | flat | stuck | hopeless
         if done.any() or iteration == MOST_ITERATIONS - 1:
-            p[going], R[going], misfit[going], iterations[going] = now.position, now.frame, value, iteration + 1
+            p[going], R[going], J[going] = now.position, now.frame, now.J
+            misfit[going], iterations[going] = value, iteration + 1
             # Rejected small steps end at a minimum as well: rounding is all that is left.
             ended = small | flat | (stuck & (length < 1e-6))
             converged[going[ended]] = True
@@ -125,7 +127,6 @@ def refine(
             damping, growth = damping[keep], growth[keep]
     U, _, V = np.linalg.svd(R)
     R = U @ V  # many small turns leave a matrix that is a rotation to a few roundings
-    J, _ = linearised(rotor, array, p, R, target, weight)
     J[..., :3] = J[..., :3] @ np.swapaxes(R, -1, -2)  # from the rotor's frame to the common one
     return Refined(
         position=p.reshape(*lead, 3),
