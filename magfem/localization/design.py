@@ -8,6 +8,7 @@ with its fourth power.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import permutations
 
 import numpy as np
 from scipy.optimize import minimize
@@ -64,8 +65,8 @@ def workspace(
 ) -> Workspace:
     """The workspace of sensors, whose noise must be stated, at `points` (..., 3) m.
 
-    axes: (k, 3), directions that the rotor's axis may have; unless stated, sixteen evenly over all directions. Raises
-    InputError as `pose_bound` does.
+    axes: (k, 3), directions that the rotor's axis may have; unless stated, twenty-four evenly over all directions.
+    Raises InputError as `pose_bound` does.
     """
     rotor, array = as_rotor(model), as_sensors(sensors)
     place = real_numbers(points, "points must be finite numbers (..., 3) in m")
@@ -85,7 +86,7 @@ def workspace(
 
 
 def _stated_axes(axes: ArrayLike | None) -> Vectors:
-    """(k, 3): those stated, or sixteen over all directions."""
+    """(k, 3): those stated, or twenty-four over all directions."""
     along = real_numbers(_AXES if axes is None else axes, "axes must be directions (k, 3)")
     if along.ndim != 2 or along.shape[1] != 3 or not len(along):
         raise InputError(f"axes must be directions (k, 3), got {along.shape}")
@@ -119,15 +120,20 @@ def _wrong_branch(rotor: Rotor, array: SensorArray, place: Points, axes: Vectors
     return np.asarray(wrong.reshape(*lead, len(axes)).max(axis=-1))
 
 
-def _half_sphere(count: int) -> Floats:
-    """(count, 3) unit vectors evenly over half of all directions, along a spiral of golden angles."""
-    z = (np.arange(count) + 0.5) / count
-    turn = np.pi * (3 - np.sqrt(5)) * np.arange(count)
-    level = np.sqrt(1 - z**2)
-    return np.stack([level * np.cos(turn), level * np.sin(turn), z], axis=-1)
+def _all_directions() -> Floats:
+    """(24, 3) unit vectors evenly over half of all directions, the other half their opposites.
+
+    The corners of a truncated cuboctahedron, which a mirror or a quarter turn leaves as they are: maps about sensors
+    that are arranged alike on both sides come out alike on both sides. None lies along or across a coordinate axis,
+    where a sensor straight below would be blind.
+    """
+    corner = np.array([1.0, 1.0 + np.sqrt(2.0), 1.0 + 2.0 * np.sqrt(2.0)])
+    signs = np.array([(1.0, y, z) for y in (1.0, -1.0) for z in (1.0, -1.0)])
+    orders = np.array(list(permutations(range(3))))
+    return np.asarray((signs[:, None] * corner[orders]).reshape(-1, 3) / np.linalg.norm(corner))
 
 
-_AXES = _half_sphere(16)
+_AXES = _all_directions()
 """Axes of all directions: one and its opposite turn the same way round."""
 
 

@@ -284,7 +284,7 @@ def workspaces(found: WorkspaceMaps) -> list[Picture]:
                 axes.plot(at, 0 * at, "s", color=GREEN, markersize=5, clip_on=False)
                 axes.set(aspect="equal", ylim=(0, None))
             line[0].set_ylabel("z (mm)")
-            bar = drawn.colorbar(filled, ax=line.tolist(), label=f"bound of the {label}", shrink=0.95)
+            bar = drawn.colorbar(filled, ax=line.tolist(), label=label, shrink=0.95)
             bar.set_ticks(levels.tolist(), labels=[f"{one:g}" for one in levels])
             bar.minorticks_off()
         for axes, spacing in zip(panels[0], study.spacings, strict=True):
