@@ -37,6 +37,7 @@ SMALL_CHANGE = 1e-5  # of the distance, and rad
 FAULTY = 1e-4  # probability of a window's misfit below which it is told from the track
 FEWEST_SAMPLES = 6  # of an axis in a window
 ALTERNATIVES = 4
+MANY = 300  # windows that take so long that progress is shown
 NEVER = 1e9  # cost of a branch that is none
 HOPELESS = 100.0  # cost of a path above the best beyond which it is not followed
 SETTLED, FROZEN = 3, 8  # iterations after which the process noise changes little, and is left as it is
@@ -124,7 +125,12 @@ def track(
     middles = begin + float(np.mean(real_numbers(times, TIMES)))
     with one_thread_for_algebra():
         seen = Windows(rotor, array, whitened(poses.fields, array))
-        found = [_follow(seen, middles, poses, path, noise) for path in _paths(poses)]
+        ways = _paths(poses)
+        found = []
+        for number, way in enumerate(ways, 1):
+            if begin.size > MANY:
+                log.info("track: %d windows, way %d of %d", begin.size, number, len(ways))
+            found.append(_follow(seen, middles, poses, way, noise))
     found = _distinct(sorted(found, key=lambda one: -one.log_evidence))
     if near is not None:
         where, likeliest = real_numbers(near, "near must be a position (3,) in m"), found[0].log_evidence
