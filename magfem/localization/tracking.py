@@ -40,12 +40,13 @@ ALTERNATIVES = 4
 MANY = 300  # windows that take so long that progress is shown
 NEVER = 1e9  # cost of a branch that is none
 HOPELESS = 100.0  # cost of a path above the best beyond which it is not followed
-SETTLED, FROZEN = 3, 8  # iterations after which the process noise changes little, and is left as it is
+SETTLED, FROZEN = 3, 8  # iterations after which the process noise is looked for near the last, and is left as it is
 START = ProcessNoise(1e-8, 1e-5)
 DECADES = 1.5
 """Deviation of the logarithms of process noise before anything was measured. Short tracks alone often prefer none, and
 would state too small a covariance."""
 
+COARSE = 4.0  # decades either way that process noise is looked for
 LOGARITHMS = (-16.0, 2.0)  # of densities: between no noise at all and no memory
 
 
@@ -248,7 +249,7 @@ def _follow(
     while True:
         measured, phase = likelihoods(seen, p, R, weight)
         motion = dynamics(np.diff(times), R[:-1, :, 2], spin[:-1])
-        if noise is None and iterations < FROZEN:  # on grids it would go on jumping, and the track with it
+        if noise is None and iterations < FROZEN:  # by then it hardly changes any more
             used = _process_noise(measured, motion, used, iterations)
         found = smooth(measured, motion, used)
         spin = 0.5 * (spin + found.state[:, 9:])  # halfway: what is not observed would swing about
@@ -263,21 +264,52 @@ def _follow(
 
 
 def _process_noise(measured: Likelihoods, motion: Dynamics, last: ProcessNoise, iterations: int) -> ProcessNoise:
-    """The densities that predict the windows best, each from those before it, on ever finer grids of their logarithms.
+    """The densities that predict the windows best, each from those before it.
 
-    Far from the end every iteration searches anew: what was found about a bad track may be far off.
+    Far from the end every iteration searches anew, on a coarse grid of logarithms: what was found about a bad track may
+    be far off. Then the top of the parabola through nine points around, ever closer.
     """
-    begin, widths = (START, (4.0, 1.0, 0.25)) if iterations < SETTLED else (last, (0.5, 0.125))
-    centre = np.log10([float(begin.position), float(begin.axis)])
+    usual = np.log10([float(START.position), float(START.axis)])
+
+    def predicted(points: Floats) -> Floats:
+        """(k,) log evidence of windows under densities of logarithms (k, 2), and of these before anything was seen."""
+        evidence = kalman_filter(measured, motion, ProcessNoise(10 ** points[:, 0], 10 ** points[:, 1])).log_evidence
+        return np.asarray(evidence.sum(axis=-1) - 0.5 * np.sum((points - usual) ** 2, axis=1) / DECADES**2)
+
+    widths: tuple[float, ...]
+    if iterations < SETTLED:
+        grid = usual + COARSE * _SQUARE_OF_SEVEN
+        centre, widths = grid[np.argmax(predicted(grid))], (0.7, 0.25)
+    else:
+        centre, widths = np.log10([float(last.position), float(last.axis)]), (0.25,)
     for width in widths:
-        steps = np.linspace(-width, width, 7)
-        first, second = (one.ravel() for one in np.meshgrid(centre[0] + steps, centre[1] + steps, indexing="ij"))
-        first, second = np.clip(first, *LOGARITHMS), np.clip(second, *LOGARITHMS)
-        evidence = kalman_filter(measured, motion, ProcessNoise(10**first, 10**second)).log_evidence.sum(axis=-1)
-        usual = (first - np.log10(float(START.position))) ** 2 + (second - np.log10(float(START.axis))) ** 2
-        best = int(np.argmax(evidence - 0.5 * usual / DECADES**2))
-        centre = np.array([first[best], second[best]])
+        centre = centre + width * _top(predicted(centre + width * _SQUARE_OF_THREE))
+    centre = np.clip(centre, *LOGARITHMS)
     return ProcessNoise(float(10 ** centre[0]), float(10 ** centre[1]))
+
+
+def _square(count: int) -> Floats:
+    """(count², 2) points −1 to 1 about the middle, in both directions."""
+    steps = np.linspace(-1.0, 1.0, count)
+    return np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)
+
+
+_SQUARE_OF_SEVEN, _SQUARE_OF_THREE = _square(7), _square(3)
+
+
+def _top(values: Floats) -> Floats:
+    """(2,) where the paraboloid through values (9,) at `_SQUARE_OF_THREE` is highest, not beyond the square.
+
+    Where it has no top, the best of the nine points.
+    """
+    x, y = _SQUARE_OF_THREE.T
+    terms = np.stack([np.ones(9), x, y, 0.5 * x**2, x * y, 0.5 * y**2], axis=1)
+    _, b_x, b_y, a_xx, a_xy, a_yy = np.linalg.lstsq(terms, values, rcond=None)[0]
+    A = np.array([[a_xx, a_xy], [a_xy, a_yy]])
+    if a_xx < 0 and np.linalg.det(A) > 0:
+        top: Floats = np.linalg.solve(A, [-b_x, -b_y])
+        return np.clip(top, -1.0, 1.0)
+    return np.asarray(_SQUARE_OF_THREE[int(np.argmax(values))])
 
 
 def _as_track(
