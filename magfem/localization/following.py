@@ -33,7 +33,9 @@ SMALL_CHANGE = 1e-5  # of the distance, and rad
 HOPELESS = 12.0  # log weight behind the best below which a hypothesis is dropped
 SETTLED = 3  # steps before a misfit may be the window's fault
 FAULTY = 1e-4  # probability of a window's misfit below which its covariance is inflated
-SAME = (0.02, 0.05)  # of the distance, and rad: hypotheses nearer to each other are one
+SAME = 4.0
+"""Squared deviations of position and axis, of two hypotheses together, within which they are one: they then tell of the
+same branch, only by other ways."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -250,13 +252,9 @@ def _explained(seen: Windows, prior: _Prior, pose: Pose, time: float) -> Belief:
     order = np.argsort(-score, kind="stable")
     kept: list[int] = []
     for one in order[score[order] > score.max() - HOPELESS]:
-        distance = np.linalg.norm(p[one])
-        apart = [
-            np.linalg.norm(p[one] - p[other]) > SAME[0] * distance
-            or np.linalg.norm(R[one, :, 2] - R[other, :, 2]) > SAME[1]
-            for other in kept
-        ]
-        if all(apart):
+        off = state[kept, :6] - state[one, :6]
+        both = covariance[kept, :6, :6] + covariance[one, :6, :6]
+        if np.all(np.einsum("ki,ki->k", off, np.linalg.solve(both, off[..., None])[..., 0]) > SAME):
             kept.append(int(one))
     kept = kept[:MOST_HYPOTHESES]
     return Belief(

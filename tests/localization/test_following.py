@@ -89,3 +89,20 @@ def test_windows_must_follow_each_other(rotor: Rotor) -> None:
         follow(belief, samples[1], TIMES, rotor, 1.0, PAIR, start=2.0, noise=NOISE)
     with pytest.raises(InputError, match="one window at a time"):
         follow(None, samples, TIMES, rotor, 1.0, PAIR, noise=NOISE)
+
+
+def test_hypotheses_that_noise_does_not_tell_apart_are_one(rotor: Rotor) -> None:
+    """One sensor, told where the magnet begins: hypotheses stay apart by what their deviations say, so that other ways
+    along one branch do not crowd out another branch; one of them is where the magnet is.
+    """
+    position, axis = (whole[:40] for whole in smooth_random(100, 3))
+    beliefs = followed(rotor, seen(rotor, position, axis, PAIR[:1], 3), PAIR[:1], near=position[0])
+    for belief in beliefs:
+        off = belief.state[:, None, :6] - belief.state[None, :, :6]
+        both = belief.state_covariance[:, None, :6, :6] + belief.state_covariance[None, :, :6, :6]
+        square = np.einsum("abi,abi->ab", off, np.linalg.solve(both, off[..., None])[..., 0])
+        assert (square > 4.0)[~np.eye(len(square), dtype=bool)].all()
+    for belief, true in zip(beliefs, np.concatenate([position, axis], axis=-1), strict=True):
+        off = belief.state[:, :6] - true
+        square = np.einsum("hi,hi->h", off, np.linalg.solve(belief.state_covariance[:, :6, :6], off[..., None])[..., 0])
+        assert square.min() < 25
