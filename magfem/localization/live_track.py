@@ -59,8 +59,8 @@ class LiveTrack:
             return
         try:
             found, *_ = track_recording(joined(self._pieces), self.setup, self.windows.length, self.windows.step)
-        except (InputError, ConvergenceError) as error:  # uneven samples, say: what is known so far must do
-            log.info("track: no process noise from %d windows: %s", count, error)
+        except (InputError, ConvergenceError):  # uneven samples, say: what is known so far must do
+            log.info("track: %d windows tell no process noise, that so far is kept", count)
             return
         self.noise = found.noise
         log.info(
