@@ -11,7 +11,7 @@ import pytest
 from scipy.stats import chi2
 
 from magfem.cli.program import command_line
-from magfem.localization import Branch
+from magfem.localization import Belief, Branch
 from magfem.rod import MagnetPoses
 from magfem.typing import Floats, Vectors
 
@@ -49,7 +49,7 @@ def off_the_quarter(poses: MagnetPoses) -> float:
     )
 
 
-def surely(pose: Branch, position: Floats) -> bool:
+def surely(pose: Branch | Belief, position: Floats) -> bool:
     """Whether a pose is as near as its covariance says: χ² of three numbers, below its value for 999 of 1000."""
     away = pose.position - position
     return bool(away @ np.linalg.inv(pose.covariance[:3, :3]) @ away < chi2.ppf(0.999, 3))
@@ -76,6 +76,7 @@ EXPECTED = {
         ("surely(pose, position) and surely(pose.branches[0], position)", True, 0),
         ("surely(both, position) and not both.ambiguous", True, 0),
         ("np.sqrt(np.mean(off**2)) < 1 and not found.ambiguous", True, 0),
+        ("surely(belief, path[-1]) and not belief.ambiguous and not belief.faulty", True, 0),
         ("[axis_off(one.axis, turned) for one in (as_published, mended, ours)] == [9.7, 9.0, 5.2]", True, 0),
         (
             "np.all(np.abs(found.sensors[0].gain - gain) < 4 * found.deviations[0].gain) and found.residual < 1.5",
